@@ -1,8 +1,9 @@
 """Draw an arm and its scene into a Meshcat window: a page in the making, or a live one."""
 
 import struct
+import threading
 from collections import defaultdict
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from itertools import count
 from typing import Any
 
@@ -50,24 +51,66 @@ FIELD_OF_VIEW, CAMERA_PLACE = 32, (-2.4, 1.6, 1.9)
 """Of the live page [degrees, m], in the frame of three.js, whose y axis points up."""
 
 
-class CapturingWindow:
-    """Stands in for Meshcat's window and keeps every command, in order and framed.
+class DrawnScene:
+    """The drawing commands that still count; any thread may add some.
 
+    A command takes the place of an earlier one for the same part of the same node, so that the
+    scene grows with what is seen, not with time, and a page that is slow leaves out what is past.
     The same drawing gives the same bytes.
+
+    Attributes
+    ----------
+    window : meshcat.Visualizer
+        What to draw on.
     """
 
     def __init__(self) -> None:
-        self.top, self.ids, self.content = Visualizer(window=self), count(), b""
+        self.window, self.ids = Visualizer(window=self), count()
+        self._commands: dict[tuple[str, str, str], tuple[int, bytes]] = {}
+        self._last, self._closed = 0, False
+        self._changed = threading.Condition()
 
     def send(self, command: Any) -> None:
-        """Keep a command; Meshcat calls this."""
-        self.content += framed(command.lower())
+        """Take a command; Meshcat calls this."""
+        self.add(command.lower())
 
+    def add(self, command: Mapping[str, Any]) -> None:
+        """Take a command as it is told; each is led by its length then."""
+        path, kind, packed = command["path"], command["type"], umsgpack.packb(command)
+        key = (path, kind, command.get("property", ""))
+        below = f"{path.rstrip('/')}/"
+        with self._changed:
+            for other in [*self._commands] if kind == "delete" else ():
+                if other[0] == path or other[0].startswith(below):
+                    del self._commands[other]
+            self._commands.pop(key, None)  # so that the order is that of the latest commands
+            self._last += 1
+            self._commands[key] = self._last, struct.pack("<I", len(packed)) + packed
+            self._changed.notify_all()
 
-def framed(command: Mapping[str, Any]) -> bytes:
-    """A command as pages read it, led by its length."""
-    packed: bytes = umsgpack.packb(command)
-    return struct.pack("<I", len(packed)) + packed
+    @property
+    def content(self) -> bytes:
+        """All commands that count now."""
+        return b"".join(told for _, told in self._commands.values())
+
+    def close(self) -> None:
+        """End all `changes`."""
+        with self._changed:
+            self._closed = True
+            self._changed.notify_all()
+
+    def changes(self) -> Iterator[bytes]:
+        """All commands that count now, and then those that come, until the scene is closed."""
+        seen = 0
+        while True:
+            with self._changed:
+                while not self._closed and self._last == seen:
+                    self._changed.wait()
+                if self._closed:
+                    return
+                news = [told for number, told in self._commands.values() if number > seen]
+                seen = self._last
+            yield from news
 
 
 class _Described(Object):

@@ -7,16 +7,13 @@ import errno
 import sys
 import threading
 import time
-from collections.abc import Iterator, Mapping
 from http.server import BaseHTTPRequestHandler
 from importlib import resources
-from itertools import count
 from socketserver import ThreadingTCPServer
 from typing import Any
 
 import numpy as np
 import pinocchio as pin
-from meshcat import Visualizer
 from numpy.typing import ArrayLike, NDArray
 
 from kinarm.arm import Arm
@@ -24,12 +21,12 @@ from kinarm.errors import OutputError, whole_number
 from kinarm.problem import ReachProblem
 from kinarm.viewer.camera import stage_scale
 from kinarm.viewer.drawing import (
+    DrawnScene,
     aim_camera,
     draw_arm,
     draw_goal,
     draw_surroundings,
     draw_trace,
-    framed,
 )
 
 HOST = "127.0.0.1"
@@ -69,7 +66,8 @@ class LiveServer(ThreadingTCPServer):
     allow_reuse_address = daemon_threads = True
 
     def __init__(self, port: int = PORT) -> None:
-        self.scene, self.ids, self.window = LiveScene(), count(), Visualizer(window=self)
+        self.scene = DrawnScene()
+        self.window = self.scene.window
         first = whole_number("port", port, 0, LAST_PORT)
         for candidate in range(first, min(first + PORTS_TRIED, LAST_PORT) + 1):
             try:
@@ -89,10 +87,6 @@ class LiveServer(ThreadingTCPServer):
         """Where a browser finds it."""
         return f"http://{HOST}:{self.port}/"
 
-    def send(self, command: Any) -> None:
-        """Pass a drawing command on; Meshcat calls this."""
-        self.scene.add(command.lower())
-
     def close(self) -> None:
         """Stop serving."""
         self.scene.close()
@@ -106,55 +100,6 @@ class LiveServer(ThreadingTCPServer):
         """Connections that break are no news to a user."""
         if not isinstance(sys.exception(), OSError):
             super().handle_error(request, client_address)
-
-
-class LiveScene:
-    """The drawing commands that still count; any thread may add some.
-
-    A command takes the place of an earlier one for the same part of the same node, so that the
-    scene grows with what is seen, not with time, and a page that is slow leaves out what is past.
-    """
-
-    def __init__(self) -> None:
-        self._commands: dict[tuple[str, str, str], tuple[int, bytes]] = {}
-        self._last, self._closed = 0, False
-        self._changed = threading.Condition()
-
-    def add(self, command: Mapping[str, Any]) -> None:
-        """Take one of Meshcat's commands."""
-        path, kind = command["path"], command["type"]
-        key = (path, kind, command.get("property", ""))
-        below = f"{path.rstrip('/')}/"
-        with self._changed:
-            for other in [*self._commands] if kind == "delete" else ():
-                if other[0] == path or other[0].startswith(below):
-                    del self._commands[other]
-            self._commands.pop(key, None)  # so that the order is that of the latest commands
-            self._last += 1
-            self._commands[key] = self._last, framed(command)
-            self._changed.notify_all()
-
-    def close(self) -> None:
-        """End all `changes`."""
-        with self._changed:
-            self._closed = True
-            self._changed.notify_all()
-
-    def changes(self) -> Iterator[bytes]:
-        """All commands that count now, and then those that come, until the scene is closed.
-
-        Each is led by its length.
-        """
-        seen = 0
-        while True:
-            with self._changed:
-                while not self._closed and self._last == seen:
-                    self._changed.wait()
-                if self._closed:
-                    return
-                news = [told for number, told in self._commands.values() if number > seen]
-                seen = self._last
-            yield from news
 
 
 class _Visit(BaseHTTPRequestHandler):

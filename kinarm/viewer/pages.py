@@ -31,7 +31,7 @@ from kinarm.problem import ProblemLike
 from kinarm.recording import Recording, record_path
 from kinarm.scene import Scene
 from kinarm.viewer.camera import stage_scale
-from kinarm.viewer.drawing import SHAPE, CapturingWindow, draw_goal, draw_stage, draw_trace, put
+from kinarm.viewer.drawing import SHAPE, DrawnScene, draw_goal, draw_stage, draw_trace, put
 from kinarm.viewer.parts import OUTCOME_COLOURS, TRACE_SIDES
 from kinarm.viewer.visual_shapes import arm_parts, collision_parts, link_joints
 from kinarm.world import World
@@ -238,13 +238,13 @@ def _replay_html(
     arm, scene = recordings[0].problem.load_arm(), recordings[0].problem.scene
     trials = list(zip(recordings, ghosts, strict=True)) if ghosts else [(r,) for r in recordings]
     policies = dict.fromkeys(run.policy for runs in trials for run in runs)
-    window, problem = CapturingWindow(), recordings[0].problem
-    draw_stage(window.top, arm, scene)
-    draw_goal(window.top["goal"], problem)
+    drawn, problem = DrawnScene(), recordings[0].problem
+    draw_stage(drawn.window, arm, scene)
+    draw_goal(drawn.window["goal"], problem)
     for number, runs in enumerate(trials):
         for name, run in zip(("run", "ghost"), runs, strict=False):
             points = np.array([arm.tool_position(state) for state in run.states])
-            way = window.top[f"trials/{number}/{name}"]
+            way = drawn.window[f"trials/{number}/{name}"]
             draw_trace(way, points, run.outcome, stage_scale(arm, scene))
     data = {
         **arm_data(arm, scene),
@@ -256,7 +256,7 @@ def _replay_html(
     }
     title = f"{' and '.join(policies)} · kinarm replay"
     scripts = ("replay_stage", "trial_list", "player")
-    return page_html("player", title, window.content, data, scripts)
+    return page_html("player", title, drawn.content, data, scripts)
 
 
 def _trial_data(runs: Sequence[Recording]) -> dict[str, Any]:
@@ -318,8 +318,8 @@ def arm_page(
 def _arm_html(arm: Arm, scene: Scene) -> str:
     """Page of an arm in a scene, with the shapes and pairs that are tested for contact."""
     model = ContactModel.build(arm, scene)
-    window = CapturingWindow()
-    frames = draw_stage(window.top, arm, scene)
+    drawn = DrawnScene()
+    frames = draw_stage(drawn.window, arm, scene)
     for number, part in enumerate(collision_parts(arm)):
         put(frames[part.joint][f"shape_{number}"], SHAPE, part.mesh)
     objects = zip(model.geometry.geometryObjects, model.body_names, strict=True)
@@ -333,7 +333,7 @@ def _arm_html(arm: Arm, scene: Scene) -> str:
     }
     data["scale"] *= NEARER
     title = f"{arm.name} · kinarm arm"
-    return page_html("arm_page", title, window.content, data, ("contact", "arm_page"))
+    return page_html("arm_page", title, drawn.content, data, ("contact", "arm_page"))
 
 
 def _shape_data(shape: pin.GeometryObject) -> dict[str, Any]:

@@ -12,7 +12,8 @@ from live_pages import commands
 from meshcat.geometry import Box
 
 from kinarm.errors import InvalidInputError, OutputError
-from kinarm.viewer.live_server import LiveScene, LiveServer
+from kinarm.viewer.drawing import DrawnScene
+from kinarm.viewer.live_server import LiveServer
 
 
 @pytest.fixture
@@ -49,7 +50,7 @@ class TestScene:
         scene.add({"type": kind, "path": path, **more})
 
     def test_the_latest_of_each_kind_counts_in_the_order_in_which_they_came(self):
-        scene = LiveScene()
+        scene = DrawnScene()
         for path in ("/a", "/b", "/a"):
             self.put(scene, path)
         self.put(scene, "/a", "set_property", property="visible", value=True)
@@ -61,7 +62,7 @@ class TestScene:
         ]
 
     def test_changes_go_on_until_the_scene_is_closed(self):
-        scene = LiveScene()
+        scene = DrawnScene()
         for path in ("/a", "/b"):
             self.put(scene, path)
         changes = scene.changes()
@@ -73,7 +74,7 @@ class TestScene:
 
     @pytest.mark.parametrize(("deleted", "left"), [("/a", ["/ab", "/c"]), ("/", []), ("", [])])
     def test_what_is_deleted_takes_all_below_it_along(self, deleted, left):
-        scene = LiveScene()
+        scene = DrawnScene()
         for path in ("/a", "/a/b", "/ab", "/c", "/end"):
             self.put(scene, path)
         self.put(scene, deleted, "delete")
