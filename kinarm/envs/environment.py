@@ -160,14 +160,26 @@ class ArmEnvironment(Lifecycle):
 
     def _set_up(
         self,
-        simulator: Simulator,
+        problem: ProblemLike,
         num_envs: int,
+        threads: int | None,
+        overrides: Mapping[str, Any],
         dtype: DTypeLike,
         render_mode: str | None,
         **picture: Any,
     ) -> None:
-        """Take a simulator, and say how its arms are shown."""
-        self.simulator, self.render_mode = simulator, render_mode
+        """Build a simulator, and say how its arms are shown; settings are those of `ReachEnv`."""
+        try:
+            changed = ReachProblem.load(problem).replace(**overrides)
+            self.simulator = simulator = Simulator(changed, threads=threads)
+        except UnknownNameError as error:
+            if error.given not in overrides:
+                raise
+            names = ", ".join(error.available)
+            raise UnexpectedArgumentError(
+                f"unexpected keyword argument {error.given!r}; available: {names}"
+            ) from error
+        self.render_mode = render_mode
         self.interface = self._make_interface(simulator, dtype)
         self.metadata = self.interface.metadata
         self._told = ("distance", *(TERM_KEYS if self.interface.tells_terms else ()))
@@ -226,28 +238,6 @@ class ArmEnvironment(Lifecycle):
     @spec.setter
     def spec(self, spec: EnvSpec | None) -> None:
         self._spec = None if spec is None else portable_spec(spec, self.simulator)
-
-
-def make_simulator(
-    problem: ProblemLike, threads: int | None, overrides: Mapping[str, Any]
-) -> Simulator:
-    """Build the simulator of an environment.
-
-    Parameters
-    ----------
-    problem, threads
-        As for `kinarm.Simulator`.
-    overrides : mapping
-        Changes to the problem, for `kinarm.ReachProblem.replace`; others are unexpected arguments.
-    """
-    try:
-        return Simulator(ReachProblem.load(problem).replace(**overrides), threads=threads)
-    except UnknownNameError as error:
-        if error.given not in overrides:
-            raise
-        raise UnexpectedArgumentError(
-            f"unexpected keyword argument {error.given!r}; available: {', '.join(error.available)}"
-        ) from error
 
 
 def fixed_scenario(options: Mapping[str, Any] | None, n_joints: int) -> dict[str, Array]:

@@ -6,13 +6,7 @@ import gymnasium
 import numpy as np
 from numpy.typing import DTypeLike
 
-from kinarm.envs.environment import (
-    ArmEnvironment,
-    Array,
-    Observations,
-    make_simulator,
-    one_by_one,
-)
+from kinarm.envs.environment import ArmEnvironment, Array, Observations, one_by_one
 from kinarm.episodes import COLLISION, RUNNING, SUCCESS, TRUNCATED, Episodes, StepResult
 from kinarm.errors import finite_array
 from kinarm.problem import ProblemLike
@@ -93,8 +87,7 @@ class ReachEnv(ArmEnvironment, gymnasium.Env[Any, Array]):
         **overrides: Any,
     ) -> None:
         picture = {"width": width, "height": height, "camera": camera}
-        simulator = make_simulator(problem, 1, overrides)
-        self._set_up(simulator, 1, observation_dtype, render_mode, **picture)
+        self._set_up(problem, 1, 1, overrides, observation_dtype, render_mode, **picture)
         self.observation_space = self.interface.observation_space
         self.action_space = self.interface.action_space
 

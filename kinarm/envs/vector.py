@@ -9,13 +9,7 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 from numpy.typing import DTypeLike, NDArray
 
-from kinarm.envs.environment import (
-    ArmEnvironment,
-    Array,
-    Observations,
-    make_simulator,
-    one_by_one,
-)
+from kinarm.envs.environment import ArmEnvironment, Array, Observations, one_by_one
 from kinarm.episodes import RUNNING, Episodes
 from kinarm.errors import InvalidInputError, whole_number
 from kinarm.problem import ProblemLike
@@ -76,10 +70,11 @@ class ReachVectorEnv(ArmEnvironment, VectorEnv[Any, Array, NDArray[Any]]):
                 f"autoreset_mode must be one of {[mode.value for mode in AutoresetMode]}, "
                 f"got {autoreset_mode!r}"
             ) from error
-        horizon = {} if max_episode_steps is None else {"horizon": max_episode_steps}
-        simulator = make_simulator(problem, threads, {**horizon, **overrides})
+        if max_episode_steps is not None:
+            overrides = {"horizon": max_episode_steps, **overrides}
+        settings = threads, overrides, observation_dtype, render_mode
         picture = {"width": width, "height": height, "camera": camera}
-        self._set_up(simulator, num_envs, observation_dtype, render_mode, **picture)
+        self._set_up(problem, num_envs, *settings, **picture)
         self.metadata = {**self.metadata, "autoreset_mode": self.autoreset_mode}
         self.num_envs = num_envs
         self.single_observation_space = self.interface.observation_space
