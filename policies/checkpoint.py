@@ -32,10 +32,7 @@ class Checkpoint(NamedTuple):
 
 
 def save_checkpoint(
-    path: str | Path | IO[bytes],
-    config: TrainingConfig,
-    state: TrainingState,
-    beside: Any = None,
+    path: str | Path | IO[bytes], config: TrainingConfig, state: TrainingState, beside: Any = None
 ) -> None:
     """Write the state of a training, replacing an earlier checkpoint only when complete.
 

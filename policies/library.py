@@ -24,8 +24,6 @@ RANKING = "ranking.json"
 SEEN = 10_000
 """Observations that the statistics of an initial policy count for: new ones soon outweigh them."""
 
-_SEED_SUFFIX = re.compile(r"-seed\d+$")
-
 
 def policy_names() -> tuple[str, ...]:
     """Names of the shipped policies, such as ``ars-tuned-both-seed0``."""
@@ -39,7 +37,7 @@ def is_shipped(path: Path) -> bool:
 
 def group_of(name: str) -> str:
     """Name without the training seed: what several seeds of one recipe and task share."""
-    return _SEED_SUFFIX.sub("", name)
+    return re.sub(r"-seed\d+$", "", name)
 
 
 def best_policy(problem: ProblemLike | None) -> str:

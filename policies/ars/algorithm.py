@@ -93,14 +93,9 @@ class ARSTraining:
         failed = state.failed
         if config.replay_share:
             failed = failed.followed_by(*scenarios.missed(rollouts), config.replay_size)
-        mean_return, std_return, success = scenarios.outcome_of_new(rollouts)
-        point = CurvePoint(
-            mean_return=mean_return,
-            std_return=std_return,
-            success=success,
-            environment_steps=state.environment_steps + int(rollouts.steps.sum()),
-            wall_time=state.wall_time + time.perf_counter() - began,
-        )
+        steps = state.environment_steps + int(rollouts.steps.sum())
+        seconds = state.wall_time + time.perf_counter() - began
+        point = CurvePoint(*scenarios.outcome_of_new(rollouts), steps, seconds)
         return ARSState(
             theta=theta,
             normalizer=normalizer,

@@ -257,10 +257,7 @@ class Tree:
 
 
 def find_detour(
-    simulator: Simulator,
-    start: Array,
-    ends: Array,
-    rng: np.random.Generator,
+    simulator: Simulator, start: Array, ends: Array, rng: np.random.Generator
 ) -> Array | None:
     """Find a contact-free path of straight segments to one of several configurations.
 

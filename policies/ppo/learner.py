@@ -53,10 +53,7 @@ class PPOTraining:
     """
 
     def __init__(
-        self,
-        config: PPOConfig,
-        tensorboard: str | Path | None = None,
-        threads: int | None = None,
+        self, config: PPOConfig, tensorboard: str | Path | None = None, threads: int | None = None
     ) -> None:
         self.config, self.arms = config, TrainingArms(config)
         if threads is None:
