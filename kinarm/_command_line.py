@@ -15,7 +15,7 @@ from typing import Any, Literal, NoReturn, TypeVar, get_args, get_origin
 
 from kinarm._fields import alternatives, expected, field_types, init_fields, summary_of
 from kinarm._interrupts import EXIT_STATUS, begin, end, was_interrupted
-from kinarm._parser import CommandParser, Parser, group_of_options
+from kinarm._parser import Parser, group_of_options
 from kinarm.errors import KinarmError, one_line
 
 METAVARS = {int: "N", float: "X", Path: "FILE"}
@@ -307,13 +307,7 @@ def run_commands(
         See `Commands`.
     """
     parser = Parser(prog=prog, description=description)
-    parsers = parser.add_subparsers(
-        title="commands",
-        dest="command",
-        required=True,
-        metavar="COMMAND",
-        parser_class=CommandParser,
-    )
+    parsers = parser.add_commands("command")
     for name, (kind, _) in commands.items():
         said = _first_line(kind)
         add_options(parsers.add_parser(name, help=said, description=said), kind)

@@ -74,6 +74,13 @@ class Parser(argparse.ArgumentParser):
             self.error(f"unrecognized arguments: {' '.join(unknown)}{hint}")
         return parsed, unknown
 
+    def add_commands(self, what: str) -> "argparse._SubParsersAction[CommandParser]":
+        """Let the first word be a command, called ``what``, which has options of its own."""
+        title, metavar = f"{what}s", what.upper()
+        return self.add_subparsers(
+            title=title, dest=what, required=True, metavar=metavar, parser_class=CommandParser
+        )
+
     def error(self, message: str) -> NoReturn:
         """Print one line on standard error and exit."""
         self.exit(2, f"{self.prog}: {one_line(message)} (see {self.prog} --help)\n")

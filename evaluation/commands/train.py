@@ -102,13 +102,7 @@ class SeedsRequest(Checked):
 def build_parser(named: str | None = None) -> Parser:
     """The options of the command, of all learners or of the one that is named."""
     parser = Parser(prog=PROG, description="Train a policy.")
-    learners = parser.add_subparsers(
-        title="learners",
-        dest="learner",
-        required=True,
-        metavar="LEARNER",
-        parser_class=CommandParser,
-    )
+    learners = parser.add_commands("learner")
     for name in learner_names() if named is None else (named,):
         _add_learner(learners, name, find_learner(name))
     return parser
