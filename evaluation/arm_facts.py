@@ -66,5 +66,6 @@ def _shape(shape: coal.CollisionGeometry) -> str:
 
 def _span(values: NDArray[np.float64] | list[float], prismatic: bool) -> str:
     """Positions or speeds as people read them: metres, or degrees; equal ones once."""
-    shown = np.round(values, 2) if prismatic else np.round(np.rad2deg(values))
+    numbers = np.asarray(values, dtype=np.float64)
+    shown = np.round(numbers, 2) if prismatic else np.round(np.rad2deg(numbers))
     return " to ".join(dict.fromkeys(f"{value:g}" for value in shown))
