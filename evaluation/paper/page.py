@@ -114,9 +114,8 @@ def claims_document(
 
 def reproduction_page(results: PaperResults, claims: Claims, document: Mapping[str, Any]) -> str:
     """``REPRODUCTION.md``."""
-    environment = template_environment(keep_trailing_newline=True)
-    environment.filters.update(median_cell=median_cell)
-    return environment.get_template("reproduction.md").render(
+    template = template_environment(keep_trailing_newline=True).get_template("reproduction.md")
+    return template.render(
         results=results,
         document=document,
         smoke=SMOKE.format(len(results.runs)),
@@ -169,16 +168,6 @@ def claim_rows(claims: Iterable[Claim]) -> list[tuple[str, ...]]:
         for claim in claims
         for part in claim.parts
     ]
-
-
-def median_cell(steps: NDArray[np.float64]) -> str:
-    """Median over seeds, and how many got there at all."""
-    reached = int(np.isfinite(steps).sum())
-    if not reached:
-        return "never"
-    median = float(np.median(steps))
-    middle = f"{median / 1e3:.0f} thousand" if np.isfinite(median) else "most never"
-    return middle if reached == len(steps) else f"{middle} ({reached} of {len(steps)} seeds)"
 
 
 def figure_2(results: PaperResults) -> "Figure":

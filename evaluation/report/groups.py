@@ -122,14 +122,11 @@ def group_results(
 def _styles(labels: Sequence[str], evaluations: Sequence[Evaluation]) -> dict[str, str]:
     """Classes by what the seeds and problems of a recipe share, in the order of appearance."""
     contestants = {label: each.contestant for label, each in zip(labels, evaluations, strict=True)}
-    styles, policies = {}, 0
-    for label, contestant in contestants.items():
-        if contestant.algorithm in UNTRAINED_ALGORITHMS:
-            styles[label] = f"reference {contestant.name}"
-        else:
-            dash, colour = divmod(policies, PAGE_COLOURS)
-            styles[label] = f"colour{colour} dash{dash % PAGE_DASHES}"
-            policies += 1
+    styles = {label: f"reference {each.name}" for label, each in contestants.items()}
+    trained = (k for k, each in contestants.items() if each.algorithm not in UNTRAINED_ALGORITHMS)
+    for number, label in enumerate(trained):
+        dash, colour = divmod(number, PAGE_COLOURS)
+        styles[label] = f"colour{colour} dash{dash % PAGE_DASHES}"
     return styles
 
 

@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 
 from kinarm.evaluation.paper.claims import assess
-from kinarm.evaluation.paper.page import claims_document, median_cell, reproduction_page, run_rows
+from kinarm.evaluation.paper.page import claims_document, reproduction_page, run_rows
 from kinarm.evaluation.paper.results import LITERAL, Reading
+from kinarm.evaluation.report.templating import template_environment
 
 
 def test_a_line_for_each_training(results_of, made_up_run):
@@ -48,4 +49,5 @@ def test_readings_without_ppo_leave_its_claims_out(results_of, made_up_run):
     ],
 )
 def test_median_over_seeds_says_how_many_got_there(steps, cell):
-    assert median_cell(np.array(steps)) == cell
+    template = template_environment().get_template("cells.md")
+    assert template.make_module({"median": np.median}).median_steps(np.array(steps)) == cell
