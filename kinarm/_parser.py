@@ -8,10 +8,11 @@ import textwrap
 import zlib
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from difflib import get_close_matches
+from importlib import import_module
+from pathlib import Path
 from typing import Any, ClassVar, NoReturn
 
 from kinarm import __version__
-from kinarm._files import shipped_files
 from kinarm.errors import one_line
 
 EXAMPLE = re.compile(r"(?m)^  (\S.*?) {2,}(\S.*)$")
@@ -41,8 +42,6 @@ class Parser(argparse.ArgumentParser):
     completable: ClassVar[bool] = True
 
     def __init__(self, **options: Any) -> None:
-        if epilog := shipped_files("help", ".txt").get(options.get("prog", "")):
-            options["epilog"] = epilog.read_text()
         super().__init__(formatter_class=HelpFormatter, add_help=False, **options)
         self._optionals.title = "general"
         self.add_argument("-h", "--help", action="help", help="Show this help and exit")
@@ -89,6 +88,9 @@ class Parser(argparse.ArgumentParser):
         """Usage, purpose, then the groups of options; what all commands have comes last."""
         general = self._optionals
         self._action_groups.sort(key=lambda group: group is general)
+        end = Path(import_module("kinarm.data").__path__[0], "help", f"{self.prog}.txt")
+        if end.is_file():
+            self.epilog = end.read_text()
         return super().format_help()
 
 
