@@ -53,6 +53,7 @@ def command_names(parser: Parser) -> list[str]:
 
 def describe(parser: Parser) -> str:
     """What help says of a program, in Markdown."""
+    parser.format_help()  # reads what it ends with
     formatter = parser._get_formatter()
     formatter._width = 80
     formatter.add_usage(parser.usage, parser._actions, parser._mutually_exclusive_groups)
