@@ -43,7 +43,7 @@ def save_checkpoint(
     config, state : TrainingConfig and TrainingState
         Settings and state of the training.
     beside : dataclass, optional
-        What else is kept, for `load_beside`.
+        What else is kept beside the state, such as a curve so far.
     """
     header = {
         "learner": config.learner,
