@@ -97,6 +97,8 @@ class RayExecutor:
         self, work: Callable[[Any], Any], tasks: Sequence[Any]
     ) -> Iterator[tuple[Any, Any | Failure]]:
         """Do the work for every task; see `Executor.map`."""
+        if not tasks:
+            return
         try:
             import ray
         except ImportError as error:

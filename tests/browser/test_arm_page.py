@@ -10,7 +10,7 @@ from kinarm.collision import ContactModel, make_verdicts_reliable
 from kinarm.scene import Obstacle, Scene
 from kinarm.viewer import arm_page
 
-ARMS = ("paper", "ur5", "so101")
+ARMS = ("paper", "ur5")
 CLOSE, CLOSE_IF_ROUND = 1e-6, 2e-6
 """Distances within which verdicts may differ; those of Coal from cylinders err by 1e-6 [m]."""
 

@@ -1,5 +1,6 @@
 """Pages of the built site in a real browser: quiet, legible and no wider than the screen."""
 
+from itertools import product
 from pathlib import Path
 
 import pytest
@@ -32,8 +33,13 @@ def pages() -> list[Page]:
     return found
 
 
-@pytest.mark.parametrize("size", SIZES)
-@pytest.mark.parametrize("chosen", CHOSEN)
+@pytest.mark.parametrize(
+    ("chosen", "size"),
+    [
+        *product([each for each in CHOSEN if each != "most replays"], SIZES),
+        ("most replays", "phone"),
+    ],
+)
 def test_page_is_quiet_legible_and_fits(browser, pages, chosen, size):
     page = max(pages, key=CHOSEN[chosen])
     width, height = SIZES[size]

@@ -41,7 +41,7 @@ top_directions = 2
 [grid]
 step_size = [0.02, 0.2]
 """
-TRAIN = "kinarm-train ars --out p.npz --directions 4 --top-directions 2 --iterations 3000"
+TRAIN = "kinarm-train ars --out p.npz --directions 4 --top-directions 2 --iterations 1500"
 STUDIED = "kinarm-study study.toml --jobs 2 --out out"
 EVALUATED = (
     "kinarm-eval --policy ars-tuned-both-seed0 --problem right --no-oracle --trials 20 --out out"
@@ -50,7 +50,7 @@ REPLAYED = "kinarm-replay --policy ars-tuned-both-seed0 --trials 3 --out r.html 
 CHECKED = "kinarm-problem check right --trials 20 --picture p.png --json p.json"
 SHOWN = "kinarm-arms show paper --out arm.html"
 LIVE = "kinarm-replay --policy zero --problem left --live --no-browser"
-SHORT = TRAIN.replace("3000", "3")
+SHORT = TRAIN.replace("1500", "3")
 
 
 @contextmanager
