@@ -201,7 +201,8 @@ class EvaluationRequest(ProblemOptions):
         from kinarm.evaluation.selection import select_pairs
 
         pairs = select_pairs(self)
-        arms = {problem.name: problem.load_arm() for _, problem in pairs}
+        problems = {problem.name: problem for _, problem in pairs}
+        arms = {name: problem.load_arm() for name, problem in problems.items()}
         for contestant, problem in pairs:
             contestant.check(arms[problem.name], allow_other_arm=self.allow_other_arm)
         if self.card is not None:
