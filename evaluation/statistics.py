@@ -6,6 +6,7 @@ Written out here, because SciPy's statistics take longer to load than a policy t
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -144,8 +145,18 @@ def percentile_interval(figures: NDArray[np.float64]) -> Interval:
     return _quantile(ordered, tail), _quantile(ordered, 1 - tail)
 
 
-def resamples(trials: int) -> Iterator[NDArray[np.int64]]:
+def resamples(trials: int) -> Iterable[NDArray[np.int64]]:
     """Numbers of the trials of all resamples, a piece of shape (n, trials) at a time; seeded."""
+    return _kept(trials) if RESAMPLES * trials <= NUMBERS_AT_ONCE else _drawn(trials)
+
+
+@lru_cache(maxsize=1)
+def _kept(trials: int) -> tuple[NDArray[np.int64], ...]:
+    """The few of one piece: policies face as many trials one after the other."""
+    return tuple(_drawn(trials))
+
+
+def _drawn(trials: int) -> Iterator[NDArray[np.int64]]:
     rng, at_once = np.random.default_rng(BOOTSTRAP_SEED), max(1, NUMBERS_AT_ONCE // trials)
     for done in range(0, RESAMPLES, at_once):
         yield rng.integers(trials, size=(min(at_once, RESAMPLES - done), trials))
