@@ -50,7 +50,7 @@ AREAS = {
     ),
     "statistics": Area(
         ("evaluation/statistics.py",),
-        ("evaluation/test_statistics*.py",),
+        ("evaluation/test_statistics*.py", "evaluation/test_metrics.py"),
         10,
     ),
     "ars": Area(("policies/ars/algorithm.py",), ("policies/test_ars*.py",), 8),
