@@ -19,10 +19,10 @@ PYTEST := $(BIN)/python -m pytest --dist loadfile --no-loadscope-reorder --durat
 WORKERS ?= auto
 
 test: $(call INSTALLED,test) ## run the tests, but for the slow ones
-	$(PYTEST) -n $(WORKERS) -m "not slow" --cov --cov-report=term --cov-fail-under=80
+	$(PYTEST) -n $(WORKERS) -m "not slow" --cov --cov-report=term --cov-fail-under=90
 
 test-slow: $(call INSTALLED,all) ## run the slow tests, and what make test skipped for want of a library
-	$(PYTEST) -n $(WORKERS) --rest --cov --cov-append --cov-report=
+	$(PYTEST) -n $(WORKERS) --rest
 
 CAMPAIGN := loaders disturbances
 

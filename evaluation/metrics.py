@@ -105,13 +105,13 @@ def _middle_half(ordered: NDArray[np.float64]) -> NDArray[np.float64]:
     return ordered[..., n // 4 : n - n // 4]
 
 
-def _median(ordered: NDArray[np.float64]) -> NDArray[np.float64]:
+def _median(ordered: NDArray[np.float64]) -> Any:
     """Median along the last axis of values that are in order, which NumPy would sort again."""
     n = ordered.shape[-1]
     return (ordered[..., (n - 1) // 2] + ordered[..., n // 2]) / 2
 
 
-def _p95(ordered: NDArray[np.float64]) -> NDArray[np.float64]:
+def _p95(ordered: NDArray[np.float64]) -> Any:
     """Their 0.95 quantile, interpolated in NumPy's way."""
     position = 0.95 * (ordered.shape[-1] - 1)
     low, high = ordered[..., math.floor(position)], ordered[..., math.ceil(position)]
