@@ -9,7 +9,7 @@ PIP_INSTALL := $(BIN)/python -m pip install --quiet --disable-pip-version-check 
 MODULES := $(shell find kinarm policies evaluation data -name __pycache__ -prune -o -type f -print | sort | cksum | cut -d' ' -f1)
 INSTALLED = $(VENV)/.installed-$(1)-$(MODULES)
 
-.PHONY: eval test test-slow campaign mutants lint docs package clean
+.PHONY: eval test test-slow test-rare campaign mutants lint docs package clean
 
 eval: $(call INSTALLED,core) ## evaluate all shipped policies on 200 trials a task
 	$(BIN)/kinarm-eval --trials 200
@@ -19,10 +19,13 @@ PYTEST := $(BIN)/python -m pytest --dist loadfile --no-loadscope-reorder --durat
 WORKERS ?= auto
 
 test: $(call INSTALLED,test) ## run the tests, but for the slow ones
-	$(PYTEST) -n $(WORKERS) -m "not slow" --cov --cov-report=term --cov-fail-under=90
+	$(PYTEST) -n $(WORKERS) -m "not slow and not rare" --cov --cov-report=term --cov-fail-under=90
 
 test-slow: $(call INSTALLED,all) ## run the slow tests, and what make test skipped for want of a library
-	$(PYTEST) -n $(WORKERS) --rest
+	$(PYTEST) -n $(WORKERS) -m "not rare" --rest
+
+test-rare: $(call INSTALLED,all) ## run the tests that CI leaves out
+	$(PYTEST) -n $(WORKERS) -m rare
 
 CAMPAIGN := loaders disturbances
 

@@ -138,8 +138,8 @@ def pytest_configure(config: pytest.Config) -> None:
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
     """Begin with the files that take long, so that no worker ends alone with one of them.
 
-    Slow tests and campaigns repeat at length what others cover: they are not traced, which
-    would take half as long again.
+    Slow tests repeat at length what others cover: they are not traced, which would take half as
+    long again.
     """
     slow = {item for item in items if item.get_closest_marker("slow")}
     if config.getoption("rest"):
@@ -151,7 +151,7 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
     items.sort(key=lambda item: item.path not in files)
     if config.pluginmanager.hasplugin("_cov"):
         for item in items:
-            if item in slow or "campaign" in item.path.parts:
+            if item in slow:
                 item.add_marker("no_cover")
 
 

@@ -14,6 +14,7 @@ BARE = "#card, #dock { display: none !important; }"
 SIZE = (480, 360)
 
 
+@pytest.mark.rare
 @pytest.mark.parametrize("problem", ["both", "shelf-panda"])
 def test_a_picture_looks_like_the_page(visit, tmp_path, problem):
     """To the eye the same: few pixels differ, and those along edges."""

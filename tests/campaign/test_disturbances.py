@@ -8,8 +8,9 @@ from . import disturbances
 from .disturbances import EVALUATED, LIVE, STUDIED, TRAIN, ended, started, unfit
 from .tally import Tally
 
+pytestmark = pytest.mark.rare
 
-@pytest.mark.slow
+
 @pytest.mark.parametrize(
     ("disturb", "command", "count"),
     [
@@ -26,7 +27,6 @@ def test_nothing_is_lost_or_left(disturb, command, count):
     assert sum(tally.counts.values()) >= count
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("command", [EVALUATED, STUDIED, "kinarm-bench --out out"])
 def test_one_process_at_a_time_writes_to_a_folder(command, tmp_path):
     (tmp_path / "out").mkdir()
@@ -37,7 +37,6 @@ def test_one_process_at_a_time_writes_to_a_folder(command, tmp_path):
     assert [path for path in (tmp_path / "out").rglob("*") if path.is_file()] == []
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(
     "surroundings",
     [

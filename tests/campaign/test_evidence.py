@@ -10,6 +10,8 @@ from tests.helpers.configurations import random_configurations
 from . import evidence, steps, verdicts
 from .engines import MARGIN, SecondEngine
 
+pytestmark = pytest.mark.rare
+
 
 @pytest.mark.parametrize(
     ("kind", "name", "size", "counted"),

@@ -5,6 +5,8 @@ import pytest
 from .loaders import LOADERS, fuzz
 from .tally import Tally
 
+pytestmark = pytest.mark.rare
+
 INPUTS = 25
 
 

@@ -94,6 +94,7 @@ def test_train(trained):
     assert log["results"].shape == log["successes"].shape == (2, 4)
 
 
+@pytest.mark.rare
 def test_train_with_other_algorithms(folder):
     """One after the other in one process, as each would be in its own."""
     others = {"td3": FLAT, "sac": GOALS, "tqc": GOALS}
@@ -112,6 +113,7 @@ def test_enjoy_evaluates(folder, trained):
     assert "Mean reward" in printed
 
 
+@pytest.mark.rare
 def test_record_video(folder, trained):
     pytest.importorskip("moviepy")
     small = ["-n", 20, "--env-kwargs", "width:64", "height:48"]
@@ -120,6 +122,7 @@ def test_record_video(folder, trained):
     assert film.stat().st_size > 500
 
 
+@pytest.mark.rare
 def test_plots(folder, trained):
     pytest.importorskip("seaborn")
     curve, table = BLOCKS["zoo-plot"].strip().splitlines()
