@@ -1,4 +1,4 @@
-"""Command lines: options from the fields of dataclasses, and how they run and end."""
+"""Command lines: options from fields of dataclasses, runs and ends."""
 
 import argparse
 import io
@@ -37,13 +37,13 @@ def add_options(
 
     Names, types and help come from the dataclass and its docstring. Fields of a nested dataclass
     get its name as a prefix, such as ``--reward-success``. A class attribute ``GROUPS`` puts fields
-    into groups of options by titles; ``DEFAULTS`` says what happens without an option whose field
-    has no telling default, and such a field may be left out.
+    into titled groups; ``DEFAULTS`` says what happens without an option whose field has no telling
+    default, and such a field may be left out.
 
     A field's metadata may hold ``flag`` (another name of the option; without dashes, of a
     positional argument), ``metavar``, ``repeat`` (repetitions of the option give a tuple, else its
-    several values), ``parse`` (makes the value of the text), ``names`` (lists the names that an
-    option takes, for help and completion) and ``completes`` (the same, for completion alone).
+    several values), ``parse`` (makes the value of the text), ``names`` (lists names for help and
+    completion) and ``completes`` (lists them for completion alone).
 
     Parameters
     ----------
@@ -204,8 +204,8 @@ def given_options(options: argparse.Namespace, kind: type) -> dict[str, Any]:
 def run_command(prog: str, command: Callable[[], None]) -> NoReturn:
     """Run a command line and exit with its status.
 
-    Status 0 is success, 1 a failure of the machine, 2 bad input, 130 an interruption; all but
-    success print one line on standard error. A reader that closes the pipe is no failure.
+    Status 0 is success, 1 a failure of the machine, 2 bad input, 130 an interruption; all others
+    print one line on standard error. A closed pipe is no failure.
     """
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):
@@ -232,7 +232,7 @@ def _run(command: Callable[[], None]) -> int:
 
 
 def _status_of(prog: str, error: BaseException) -> int:
-    """Report an error in one line; return its status, or raise kinarm's own faults."""
+    """Report an error in one line; return its status, or raise kinarm's faults."""
     if was_interrupted(error):
         _discard_output()
         said = str(error) if isinstance(error, KeyboardInterrupt) else ""

@@ -29,7 +29,7 @@ _activities = [""]
 
 @contextmanager
 def told_of_activities(listener: Callable[[str], object]) -> Iterator[None]:
-    """Tell a listener what begins, in words, and when it is over, what goes on, or ""."""
+    """Tell a listener what begins, and what goes on when it is over, or ""."""
     _listeners.append(listener)
     try:
         yield
@@ -58,7 +58,7 @@ def _tell() -> None:
 
 
 def open_console(*, stderr: bool = False, file: IO[str] | None = None) -> "Console":
-    """A console that prints texts as they are: names and paths hold no markup.
+    """A console that prints texts without markup.
 
     It is as wide as the terminal. Piped standard output, unless ``COLUMNS`` is set in the
     environment, and files are unbounded.
@@ -134,7 +134,7 @@ def print_table(
 def working(doing: str) -> Iterator[Callable[[str], object]]:
     """Say what a command is doing on standard error, if that is a terminal.
 
-    Yields a function to say something else. Compilation of kernels is said, too.
+    Yields a function to say something else, and tells of compilation.
     """
     said = doing
     with open_console(stderr=True).status(doing) as status:

@@ -1,7 +1,6 @@
 """Frozen dataclasses from plain values and back, for TOML, JSON and command lines.
 
-Names, types and defaults of fields, and their meanings in the docstring's Parameters, are stated
-once, for files, messages and options.
+Fields and their docstring's Parameters serve files, messages and options.
 """
 
 import re
@@ -85,8 +84,7 @@ def take_base(entries: dict[str, Any], where: str, bases: Collection[str], defau
 def from_plain(kind: type[T], entries: object, where: str, path: str = "") -> T:
     """Build a dataclass from plain values by field names.
 
-    What is unknown, missing, of the wrong type or refused is an `InvalidInputError` of one line,
-    with source, key and what is expected.
+    What is unknown, missing, of the wrong type or refused is an `InvalidInputError` of one line.
 
     Parameters
     ----------
@@ -121,8 +119,8 @@ def from_plain(kind: type[T], entries: object, where: str, path: str = "") -> T:
 class Checked:
     """Base of frozen dataclasses that obey their annotations and metadata.
 
-    Lists and arrays become tuples, numbers become Python's, whole ones where asked for. The rest is
-    refused, as are numbers out of range; see `kinarm.errors.check_range`.
+    Lists and arrays become tuples, and numbers become Python's. The rest is refused, as are numbers
+    out of range; see `kinarm.errors.check_range`.
     """
 
     def __post_init__(self) -> None:
@@ -173,7 +171,7 @@ def _value(hint: Any, entry: Any, where: str, path: str, kind: type) -> Any:
 
 
 def _is_scalar(hint: Any, entry: object) -> bool:
-    """Whether a plain value has a type: whole numbers are numbers, truth values not."""
+    """Whether a plain value has a type: truth values are no numbers."""
     if hint in (str, Path):
         return isinstance(entry, str | Path)
     if hint is bool or isinstance(entry, bool):

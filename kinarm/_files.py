@@ -1,8 +1,7 @@
 """Files: written whole or not at all, and read so that damage is one line.
 
-What cannot be written is an `OutputError` in one line. Arrays lie in ``.npz`` files with a header
-in JSON, without pickle, which `load_archive` alone reads. What is computed only to be used again
-lies in the user's cache folder.
+What cannot be written is an `OutputError`. Arrays lie in ``.npz`` files with a header in JSON,
+without pickle, which `load_archive` alone reads.
 """
 
 import fcntl
@@ -28,7 +27,6 @@ from kinarm.errors import InvalidInputError, KinarmError, OutputError, UnknownNa
 is_file, is_folder = os.path.isfile, os.path.isdir
 """Whether a file or folder exists; no if none can have this name."""
 
-
 KINDS = "biufU"
 """Kinds of arrays: truth values, whole numbers, numbers and texts."""
 
@@ -50,8 +48,8 @@ def _reported(path: str | Path, doing: str = "write") -> Iterator[None]:
 def write_atomically(path: str | Path, write: Callable[[IO[bytes]], object]) -> None:
     """Let ``write`` fill a file beside its place, which then is moved there.
 
-    Links are followed. A device or the like is written to directly. A process that is killed leaves
-    a file that the next one overwrites.
+    Links are followed, and devices written to directly. What a killed process leaves is overwritten
+    by the next one.
     """
     target = Path(os.path.realpath(path))
     beside = target.with_name(f".{target.name}.part")
@@ -315,7 +313,7 @@ def reading(
 
 
 def cache_folder() -> Path:
-    """Folder of the cache: ``$KINARM_CACHE``, or ``kinarm`` in the user's cache folder."""
+    """``$KINARM_CACHE``, or ``kinarm`` in the user's cache folder."""
     users = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
     return Path(os.environ.get(CACHE_VARIABLE) or Path(users) / "kinarm")
 

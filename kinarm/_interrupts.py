@@ -1,9 +1,8 @@
-"""Requests to end: Ctrl-C and its like end a command in order, in one line and with one status.
+"""Requests to end: Ctrl-C and its like end a command in one line and with one status.
 
-A command that starts ends at once, from its first line on, which is that of this module. While it
-runs, an `Interruption` is raised, which `was_interrupted` recognises even where libraries make
-another error of it. While it ends, requests are ignored. Processes that only import kinarm are left
-alone.
+A command that starts, with this module, ends at once. While it runs, an `Interruption` is raised,
+which `was_interrupted` recognises even where libraries make another error of it. While it ends,
+requests are ignored. Processes that only import kinarm are left alone.
 """
 
 import os
@@ -74,7 +73,7 @@ def was_interrupted(error: BaseException) -> bool:
 
 @contextmanager
 def telling(what_is_left: "Callable[[], str]") -> "Iterator[None]":
-    """Do what can be interrupted; ``what_is_left`` then gives the printed line."""
+    """Do what can be interrupted; ``what_is_left`` then gives a line."""
     try:
         yield
     except BaseException as error:

@@ -15,9 +15,7 @@ SHARED_STEPS = 2048
 
 def available_threads() -> int:
     """Processors that this process may use."""
-    if hasattr(os, "sched_getaffinity"):
-        return len(os.sched_getaffinity(0))
-    return os.cpu_count() or 1
+    return len(os.sched_getaffinity(0))
 
 
 def run_rows(
@@ -25,7 +23,7 @@ def run_rows(
 ) -> int:
     """Call ``kernel(first, last, *arrays)`` for ranges that cover n rows; add up the results.
 
-    Kernels release the GIL and treat rows independently: neither threads nor ranges change results.
+    Neither threads nor ranges change results. Kernels release the GIL.
 
     Parameters
     ----------
@@ -54,8 +52,8 @@ def run_together(
 ) -> int:
     """Call ``kernel(counters, given(thread), *arrays)`` on several threads; add up the results.
 
-    By a counter, zero at first, kernels share the rows, so that none is left with more than the
-    others. The calling thread is number 0. A thread that comes too late is not awaited.
+    By a counter, zero at first, kernels share the rows. The calling thread is number 0. A thread
+    that comes too late is not awaited.
 
     Parameters
     ----------

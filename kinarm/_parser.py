@@ -1,4 +1,4 @@
-"""The parser of command lines: readable help, one-line errors, version, completion."""
+"""The parser of command lines: help, one-line errors, version and completion."""
 
 import argparse
 import re
@@ -36,7 +36,7 @@ FUNCTIONS: dict[str, Callable[[Iterable[str], str], str]] = {
 class Parser(argparse.ArgumentParser):
     """An argument parser that reports bad usage in one line and exits with status 2.
 
-    Its help ends with the text of ``data/help`` that is named like the command, if any.
+    Its help ends with the text of ``data/help`` with its name, if any.
     """
 
     completable: ClassVar[bool] = True
@@ -85,7 +85,7 @@ class Parser(argparse.ArgumentParser):
         self.exit(2, f"{self.prog}: {one_line(message)} (see {self.prog} --help)\n")
 
     def format_help(self) -> str:
-        """Usage, purpose, then groups of options, of which the general one is last."""
+        """Usage, purpose, then groups of options, the general one last."""
         general = self._optionals
         self._action_groups.sort(key=lambda group: group is general)
         end = Path(import_module("kinarm.data").__path__[0], "help", f"{self.prog}.txt")
@@ -111,8 +111,7 @@ def group_of_options(parser: argparse._ActionsContainer, title: str) -> argparse
 class HelpFormatter(argparse.HelpFormatter):
     """Wraps paragraphs, but not blocks with indented lines.
 
-    If an example in a block is too long, their meanings get own lines. Usage names what is
-    required.
+    If an example in a block is too long, their meanings get own lines.
     """
 
     def _format_usage(

@@ -169,7 +169,7 @@ class Arm:
 
     @property
     def reach(self) -> float:
-        """Upper bound of the distance from the world's origin to the tool point [m]."""
+        """Bound on the distance from the world's origin to the tool point [m]."""
         return float(link_lengths(self.chain).sum() + np.linalg.norm(self.chain.tool))
 
     @cached_property
@@ -259,7 +259,7 @@ def _build_shapes(description: Description, model: pin.Model) -> pin.GeometryMod
 
 
 def _trailing_idle_axes(model: pin.Model, chain: Chain) -> int:
-    """Count the joints at the end of the chain that pass through the tool point."""
+    """Number of last joints whose axes pass through the tool point."""
     point = chain.tool
     for idle, joint in enumerate(reversed(range(chain.n_joints))):
         offset = np.linalg.norm(np.cross(chain.axis[joint], point))
@@ -272,7 +272,7 @@ def _trailing_idle_axes(model: pin.Model, chain: Chain) -> int:
 def _n_actuated(
     named: tuple[str, ...] | None, model: pin.Model, chain: Chain, description: Description
 ) -> int:
-    """Number of joints that actions move: those named, or all that move the tool."""
+    """Number of actuated joints: those named, or all that move the tool."""
     names = list(model.names)[1:]
     if named is None:
         n_actuated = chain.n_joints - _trailing_idle_axes(model, chain)

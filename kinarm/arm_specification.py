@@ -1,4 +1,4 @@
-"""Which arm: its name or file and its used parts, without libraries that read it."""
+"""Which arm: its name or file and its used parts, without loading it."""
 
 from dataclasses import dataclass, field, replace
 from pathlib import Path

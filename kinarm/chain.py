@@ -47,7 +47,7 @@ class Chain(NamedTuple):
 
     @classmethod
     def from_model(cls, model: pin.Model, tool_frame: str) -> "Chain":
-        """Take the arrays from a Pinocchio model of a serial chain and its tool frame."""
+        """Take the arrays from a serial Pinocchio model and its tool frame."""
         frame = model.frames[model.getFrameId(tool_frame, pin.FrameType.BODY)]
         placements = [model.jointPlacements[i] for i in range(1, model.njoints)]
         subspaces = np.array([_motion_subspace(model.joints[i]) for i in range(1, model.njoints)])
@@ -68,7 +68,7 @@ class Chain(NamedTuple):
 
 
 def _motion_subspace(joint: pin.JointModel) -> NDArray[np.float64]:
-    """Direction of a joint's motion in its own frame: linear, then angular, shape (6,)."""
+    """A joint's motion in its own frame: linear, then angular, shape (6,)."""
     data = joint.createData()
     joint.calc(data, np.zeros(1))
     return np.array(data.S).reshape(6)
@@ -124,8 +124,8 @@ class MotionBounds(NamedTuple):
     def of(cls, chain: Chain, n: int) -> "MotionBounds":
         """Bound the motion of a chain whose first n joints move.
 
-        By a revolute joint before it, the derivative of a joint's motion is their cross product,
-        hence no longer than itself; a prismatic joint does not change it.
+        A revolute joint before a joint changes its motion by the cross product of both, which is no
+        longer than the motion; a prismatic joint does not change it.
         """
         origin = np.zeros((1, 3))
         moved = range(n)
@@ -144,7 +144,7 @@ class MotionBounds(NamedTuple):
 
 
 def link_lengths(chain: Chain) -> NDArray[np.float64]:
-    """Bound on the distance of each joint frame's origin from the last [m], shape (n,)."""
+    """Bound on the distance of each joint's origin from the last [m], shape (n,)."""
     slide = np.where(chain.prismatic, np.fmax(np.abs(chain.lower), np.abs(chain.upper)), 0.0)
     lengths: NDArray[np.float64] = np.linalg.norm(chain.translation, axis=1) + slide
     return lengths
@@ -153,8 +153,8 @@ def link_lengths(chain: Chain) -> NDArray[np.float64]:
 def point_speed(chain: Chain, axis: int, link: int, points: NDArray[np.float64]) -> float:
     """Bound on the speed of points of a link per unit speed of a joint [m/rad, or m/m].
 
-    A revolute joint moves a point by its distance from the axis: at most the fixed distance of the
-    next joint from the axis, and the lengths of the links beyond.
+    A revolute joint moves a point by its distance from the axis: at most that of the next joint,
+    and the lengths of the links beyond.
 
     Parameters
     ----------

@@ -194,14 +194,14 @@ def random_configurations(model: ContactModel, count: int, seed: int = 0) -> Arr
 
 
 GOALS, MANY = 100, 0.1
-"""Goals to look at, and the share that may lack a configuration without a warning."""
+"""Goals to look at, and the share that may be missed without a warning."""
 
 
 def find_reachable(world: "World", goals: Array, configurations: int = 50_000) -> NDArray[np.bool_]:
     """Find out which goals have a configuration without contact.
 
-    Random configurations may bring the tool within the tolerance; the remaining goals are left to
-    inverse kinematics. An arm that always touches something is refused.
+    Random configurations are tried first, then inverse kinematics. An arm that always touches
+    something is refused.
 
     Parameters
     ----------

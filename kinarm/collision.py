@@ -1,8 +1,7 @@
 """Contact between the arm, the scene and itself: Coal decides, enclosing shapes prove freedom.
 
-`ContactModel` holds one list of pairs twice: as a Pinocchio/Coal geometry model, which decides
-about a configuration, and as flat arrays (`ContactShapes`), from which the compiled simulator
-proves that most configurations need no such decision.
+`ContactModel` holds one list of pairs twice: as a Pinocchio/Coal geometry model, which decides, and
+as flat arrays (`ContactShapes`), from which kernels prove most configurations.
 """
 
 import warnings
@@ -23,10 +22,10 @@ from kinarm.errors import ProblemError
 from kinarm.scene import Scene
 
 CLOSE, OFTEN, CLOSENESS_SAMPLES = 0.025, 0.05, 200
-"""Close pairs are nearer than this [m] at more than this share of so many samples."""
+"""Close pairs are nearer than this [m] in more than this share of these samples."""
 
 GUESS, HINT = np.array([1.0, 0.0, 0.0]), np.zeros(2, dtype=np.int32)
-"""Where Coal's searches start: direction between shapes, and numbers of corners."""
+"""Starts of Coal's searches: direction between shapes, and numbers of corners."""
 
 FEW = 4
 """Of up to so many steps in doubt, Coal tells what touches."""
@@ -211,10 +210,9 @@ def make_verdicts_reliable(data: pin.GeometryData) -> pin.GeometryData:
     """Make Coal's verdicts reliable and a function of the configuration alone; return the data.
 
     By default Coal starts where its last call on the same pair ended, and verdicts within its
-    tolerance of 1e-6 m depend on what was asked before. A guess in the request, which `start_anew`
-    puts back, replaces that. Unless it is to describe the contact, Coal may stop at a distance of
-    some 1e-7 m and call bodies apart that are centimetres deep in each other, once in some 100 000
-    times.
+    tolerance of 1e-6 m depend on that. A guess in the request, which `start_anew` puts back,
+    replaces it. Without a description of the contact, Coal may stop at a distance of some 1e-7 m
+    and call bodies apart that are centimetres deep in each other, once in some 100 000 times.
     """
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", DeprecationWarning)
@@ -248,7 +246,7 @@ def _links(arm: Arm) -> list[str]:
 
 
 def body_names(arm: Arm) -> tuple[str, ...]:
-    """Name each collision shape after its link, numbered only where a link has several."""
+    """Links of the collision shapes, numbered only where a link has several."""
     names, links = [shape.name for shape in arm.geometry.geometryObjects], _links(arm)
     return tuple(
         link if links.count(link) == 1 else name for link, name in zip(links, names, strict=True)
@@ -275,7 +273,7 @@ def _candidate_pairs(arm: Arm, geometry: pin.GeometryModel, n_shapes: int) -> li
 def _uninformative_pairs(
     arm: Arm, geometry: pin.GeometryModel, n_shapes: int, names: tuple[str, ...]
 ) -> dict[int, str]:
-    """Pairs within the arm that touch at home, and pairs of the mounting, with the reason.
+    """Pairs within the arm that touch at home, and of the mounting, with reasons.
 
     The mounting is the first link against the world, where it touches never, or the ground always,
     at 721 positions along the range of the first joint.

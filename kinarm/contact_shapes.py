@@ -1,4 +1,4 @@
-"""Polytopes and capsules around what may touch, as flat arrays for proofs of freedom."""
+"""Flat arrays of polytopes and capsules around what may touch, for proofs."""
 
 from collections.abc import Collection
 from itertools import product
@@ -43,7 +43,7 @@ SIDES = 32
 
 
 class Enclosure(NamedTuple):
-    """Hull of corners, shape (n, 3), widened by a radius [m], in the frame of a joint."""
+    """Hull of corners, shape (n, 3), widened by a radius [m], in a joint's frame."""
 
     corners: Array
     rounding: float
@@ -57,9 +57,8 @@ class Enclosure(NamedTuple):
 def enclosing_polytope(shape: pin.GeometryObject, most: int = MANY) -> Enclosure:
     """Rounded polytope of at most so many corners around a shape, in the frame of its joint.
 
-    It equals a capsule, sphere or box. Of a mesh, it is the hull of a few vertices, each the
-    farthest from the hull of those before, widened by the distance of the farthest one left. Other
-    shapes raise ArmError.
+    It equals a capsule, sphere or box. A mesh gets the hull of a few vertices, each the farthest
+    from the hull before, widened by the distance of the farthest left. Others raise ArmError.
     """
     corners, radius = core(shape)
     local = Enclosure(corners, radius)
@@ -71,7 +70,7 @@ def enclosing_polytope(shape: pin.GeometryObject, most: int = MANY) -> Enclosure
 
 
 def core(shape: pin.GeometryObject) -> tuple[Array, float]:
-    """Corners, shape (n, 3), whose hull, widened by the radius, is or encloses a shape."""
+    """Corners, shape (n, 3), and radius whose widened hull is or encloses a shape."""
     body = shape.geometry
     if isinstance(body, coal.Sphere):
         return np.zeros((1, 3)), float(body.radius)
@@ -115,7 +114,7 @@ def _fitted(points: Array, most: int) -> dict[str, Any]:
 
 
 def enclosing_capsule(shape: pin.GeometryObject) -> Enclosure:
-    """Capsule around a shape in the frame of its joint; it equals a capsule or sphere."""
+    """Capsule around a shape in its joint's frame; equal to a capsule or sphere."""
     corners, radius = core(shape)
     few = len(corners) <= 2
     local = Enclosure(corners[[0, -1]], radius) if few else _capsule_around(corners)
@@ -254,7 +253,7 @@ class ContactShapes(NamedTuple):
 def _enclosed(
     objects: list[pin.GeometryObject], scene: Scene
 ) -> tuple[list[Enclosure], list[int], list[int]]:
-    """Bodies around shapes and obstacles, their joints, and their finer bodies."""
+    """Bodies of shapes and obstacles, their joints, and their finer bodies."""
     bodies = [enclosing_polytope(shape, FEW) for shape in objects]
     bodies += [Enclosure(_corners(each), 0.0) for each in scene.obstacles]
     links = [*(shape.parentJoint for shape in objects), *(0 for _ in scene.obstacles)]
@@ -274,7 +273,7 @@ def _corners(obstacle: Obstacle) -> Array:
 
 
 def _turned_back(obstacle: Obstacle) -> Array:
-    """Opposite corners of an obstacle, turned back by its yaw in the world, shape (2, 3)."""
+    """Opposite corners of an obstacle, turned back by its yaw, shape (2, 3)."""
     ends = np.array([obstacle.lower, obstacle.upper])
     if not obstacle.yaw:
         return ends
@@ -282,7 +281,7 @@ def _turned_back(obstacle: Obstacle) -> Array:
 
 
 def _turned(points: Array, rotation: Array, about: Array | float = 0.0) -> Array:
-    """Points, shape (n, 3), turned about a point; without BLAS, the same on every machine."""
+    """Points, shape (n, 3), turned without BLAS: the same on every machine."""
     terms = [(points - about)[:, k, None] * rotation[:, k] for k in range(3)]
     return about + terms[0] + terms[1] + terms[2]
 

@@ -1,4 +1,4 @@
-"""Rules, actions and episodes as arrays for kernels, and outcomes of episodes."""
+"""Rules, actions and episodes as arrays for kernels, and outcomes."""
 
 from dataclasses import dataclass
 from functools import partial
@@ -16,7 +16,6 @@ RUNNING, PAUSED, SUCCESS, COLLISION, TRUNCATED = range(5)
 
 LINEAR, TANH, RELU, HARDTANH, ELU, LEAKY_RELU, SILU = range(7)
 """Activation functions of networks."""
-
 
 Outcome = Literal["success", "collision", "truncated"]
 """How an episode ends: goal, contact or horizon."""
@@ -126,7 +125,7 @@ class Episodes(NamedTuple):
     path: Array
 
     def resume(self, rows: NDArray[np.int64], horizon: int) -> None:
-        """Let episodes go on after success or contact; truncate them at the horizon."""
+        """Let episodes go on after success or contact, up to the horizon."""
         over = self.steps[rows] >= horizon
         self.status[rows] = np.where(over, TRUNCATED, RUNNING)
 

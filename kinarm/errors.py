@@ -11,7 +11,7 @@
     └── WorkerError, TrainingFailedError
 
 Command lines turn them into one line on standard error and exit status 2, or 1 for the last two,
-which are failures of a run.
+failures of a run.
 """
 
 import copyreg
@@ -36,7 +36,7 @@ SHARE = {"must": "lie in [0, 1]", "holds": lambda value: 0 <= value <= 1}
 """Ranges of numbers: metadata of fields."""
 
 LARGEST = 1e6
-"""Largest number in settings [m or any unit]: parameters would overflow with larger ones."""
+"""Largest number in settings [m or any unit], against overflows of parameters."""
 
 
 def one_line(text: str) -> str:
@@ -66,7 +66,7 @@ class ArmError(KinarmError):
 
 
 class ProblemError(KinarmError):
-    """A problem is inconsistent, not the expected one, or without contact-free starts."""
+    """A problem is inconsistent, unexpected, or without contact-free starts."""
 
 
 class InvalidInputError(KinarmError, ValueError):
@@ -106,7 +106,7 @@ class StartInContactError(KinarmError):
 
 
 class PolicyFileError(KinarmError):
-    """A policy file is missing, truncated, foreign, too new, or for something else."""
+    """A policy file is missing, truncated, foreign, too new, or does not fit."""
 
 
 class RecordingFileError(KinarmError):

@@ -1,8 +1,7 @@
 """Replay of failed scenarios: training episodes that begin where earlier ones failed.
 
 A policy that reaches most goals meets few scenarios to learn from. A training may therefore draw a
-share of its scenarios from those of the last failed episodes. Their distribution then differs from
-an evaluation's, which replays none.
+share of them from the last failures; evaluations never do.
 """
 
 from collections.abc import Callable
@@ -24,9 +23,8 @@ class FailedScenarios(NamedTuple):
     """Scenarios of the last episodes that failed, oldest first.
 
     One that failed k times among the last ``size`` failures is held k times, and all are replayed
-    with equal chance, hence in proportion to recent failures, without priorities to be tuned. A
-    mastered scenario is forgotten after ``size`` failures of others. Those that always fail can
-    displace all others.
+    with equal chance. A mastered one is forgotten after ``size`` failures of others. Those that
+    always fail can displace all others.
 
     Attributes
     ----------

@@ -1,4 +1,4 @@
-"""Kinematics of an arm: poses, Jacobians, and configurations for targets of the tool."""
+"""Kinematics of an arm: poses, Jacobians, and inverse kinematics."""
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
@@ -24,7 +24,7 @@ from kinarm.kernels.kinematics import follow_frame
 from kinarm.randomness import low_discrepancy_points
 
 ISOLATED_SEPARATION, CONTINUUM_SEPARATION = 1e-3, 0.2
-"""Least difference in some joint of isolated solutions, and of others [rad or m]."""
+"""Least difference in some joint of isolated and of other solutions [rad or m]."""
 
 SEEDS, LEAST_SEEDS = 1024, 128
 """Seeds: at most, and before a search for isolated solutions may end."""
@@ -68,7 +68,7 @@ class InverseSolutions:
 
 
 class Kinematics(ABC):
-    """Compiled kinematics of an arm; a `World` also tells what the arm touches."""
+    """Compiled kinematics of an arm; a `World` also knows about contact."""
 
     arm: Arm
     threads: int
@@ -84,7 +84,7 @@ class Kinematics(ABC):
 
     @cached_property
     def tool(self) -> Frame:
-        """Frame with its origin in the tool point and the axes of the arm's tool frame."""
+        """Frame at the tool point with the axes of the arm's tool frame."""
         model = self.arm.model
         return Frame.of(model.frames[model.getFrameId(self.arm.tool_frame, pin.BODY)])
 
@@ -152,7 +152,7 @@ class Kinematics(ABC):
         Damped Newton steps move seeds to an error of 1e-10 of the arm's reach and 1e-10 rad.
         Solutions are *isolated*, and each is returned once, if no more joints move than the target
         has coordinates: 3 of a position, 5 with a direction, 6 of a pose. Else, and at singular
-        configurations, solutions are spread over a continuum. Targets do not affect each other.
+        configurations, they are spread over a continuum. Targets do not affect each other.
 
         Parameters
         ----------
@@ -197,7 +197,7 @@ class Kinematics(ABC):
     def _solutions(
         self, search: Search, positions: Array, directions: Array, most: int
     ) -> tuple[Array, NDArray[np.int64]]:
-        """Configurations, and their targets, for positions (n, 3) and directions (n, n_axes, 3)."""
+        """Solutions, and their targets, at positions (n, 3) and directions (n, n_axes, 3)."""
         n_joints = self.arm.n_joints
         found, counts = [], np.empty(len(positions), dtype=np.int64)
         for first in range(0, len(positions), LOT):
@@ -296,7 +296,7 @@ def _approach(arm: Arm) -> Array:
 
 
 def _moved(arm: Arm, axes: Array) -> int:
-    """Number of joints that move: those of the actions, or all that matter for a pose."""
+    """Number of joints that move: actuated ones, or all that matter for a pose."""
     if len(axes) == 0:
         return arm.n_actuated
     chain = arm.chain

@@ -1,4 +1,4 @@
-"""Mesh files: paths, content, and convex hulls, which are no smaller than the mesh's."""
+"""Mesh files: paths, content, and convex hulls, which are never too small."""
 
 import itertools
 import re
@@ -111,7 +111,7 @@ def mesh_content(path: Path) -> bytes:
 
 
 def _check_collada(content: bytes) -> None:
-    """Refuse a Collada file of bad numbers, at which Assimp hangs or ends the process."""
+    """Refuse a Collada file of bad numbers: Assimp hangs or ends the process."""
     for element in parse_xml(content).iter():
         tag = element.tag.rpartition("}")[2]
         for name in COUNTS:
@@ -124,7 +124,7 @@ def _check_collada(content: bytes) -> None:
 
 
 def check_vertices(path: Path, vertices: NDArray[np.float64]) -> None:
-    """Refuse a mesh whose vertices, shape (n, 3), have no volume or are too far [m]."""
+    """Refuse vertices, shape (n, 3), without volume or too far away [m]."""
     farthest = np.abs(vertices).max(initial=0.0)
     if not farthest <= FARTHEST:
         raise ArmError(f"mesh {path.name!r} has a vertex {farthest:g} m away")
@@ -165,8 +165,8 @@ def _corners(path: Path, scale: NDArray[np.float64]) -> Arrays:
 def enclosing_corners(points: NDArray[np.float64]) -> NDArray[np.float64]:
     """Corners, at most ``2 * PLANES - 4``, of a polytope around points with a volume [m].
 
-    Faces touch the points. They begin with a bevelled box; then the corner that stands out farthest
-    is cut off, until none does by more than `EXCESS`.
+    Faces touch the points. They begin with a bevelled box; the corner that stands out farthest is
+    cut off until all are within `EXCESS`.
     """
     middle = (points.min(axis=0) + points.max(axis=0)) / 2
     around = points - middle
@@ -204,9 +204,8 @@ def _unit(direction: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def _support(points: NDArray[np.float64], normals: NDArray[np.float64]) -> NDArray[np.float64]:
-    """How far points reach along directions, rounded up to the grid [m], shape (n,)."""
+    """Reach of points along directions, rounded up to the grid [m], shape (n,)."""
     # Sums without BLAS: the same on every machine.
     x, y, z = points.T
     reach = [(nx * x + ny * y + nz * z).max() for nx, ny, nz in normals]
-    support: NDArray[np.float64] = np.ceil(np.array(reach) / GRID + 1e-3) * GRID
-    return support
+    return np.ceil(np.array(reach) / GRID + 1e-3) * GRID

@@ -60,8 +60,7 @@ class Mirror(NamedTuple):
 
     def on_the_left(self, observations: Array) -> NDArray[np.bool_]:
         """Which observations, shape (n, n_observations), have a goal on the left."""
-        left: NDArray[np.bool_] = observations[:, GOAL_SIDE] > 0
-        return left
+        return observations[:, GOAL_SIDE] > 0
 
     def from_the_right(self, observations: Array) -> Array:
         """Reflect observations, shape (n, n_observations), of goals on the left."""
@@ -120,7 +119,7 @@ class Networks:
 
     @classmethod
     def linear(cls, matrices: Array, biases: Array) -> Networks:
-        """Linear policies of maps, shape (n, n_actions, n_observations), and biases."""
+        """Linear policies: maps, shape (n, n_actions, n_observations), and biases."""
         n, n_out, n_in = matrices.shape
         flat = matrices.transpose(0, 2, 1).reshape(n, -1)
         return cls(np.array([n_in, n_out]), np.concatenate([flat, biases], axis=1))

@@ -1,7 +1,7 @@
 """The observation: its parts in a table, each with its formula.
 
-A new part is a function that writes it and an entry of `OBSERVATION`; kernels, spaces, tables of
-the documentation and the mirror follow. Policies of another layout are refused.
+A new part is a function that writes it and an entry of `OBSERVATION`; all else follows. Policies of
+another layout are refused.
 """
 
 from collections.abc import Callable, Sequence
@@ -19,8 +19,8 @@ VERSION = 1
 class Ranges(NamedTuple):
     """Ranges of the entries of an observation in a problem.
 
-    Corners of a box that holds all goals with tolerance, and a bound on the distance from the
-    world's origin to any point of the arm [m].
+    A box of all goals with tolerance, and a bound on the distance from the world's origin to any
+    point of the arm [m].
     """
 
     goal_lower: Array
@@ -154,7 +154,7 @@ OBSERVATION = (
         per_joint=True,
     ),
 )
-"""The parts in order; those per joint go through all joints before the next."""
+"""The parts in order; those per joint go through all joints in turn."""
 
 
 GOAL_SIDE = 1
@@ -173,7 +173,7 @@ def observation_layout() -> str:
 
 
 def observation_signs(n_joints: int) -> Array:
-    """Signs that the reflection y -> -y gives the entries, shape (n_observations,)."""
+    """Signs that the reflection y -> -y gives entries, shape (n_observations,)."""
     return np.concatenate([part.repeated(part.signs, n_joints) for part in OBSERVATION])
 
 

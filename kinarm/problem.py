@@ -1,7 +1,7 @@
 """The problem: an arm, a scene, a task and a stepping, as one value.
 
-Whatever simulates, trains, evaluates or stores takes a problem. What cannot be used is a
-`KinarmError` of one line. Problems, scenes and tasks also lie in files, shipped or the user's.
+What cannot be used is a `KinarmError` of one line. Problems, scenes and tasks also lie in files,
+shipped or the user's.
 """
 
 import hashlib
@@ -162,9 +162,9 @@ class ReachProblem(Checked):
         return hashlib.sha256(text.encode()).hexdigest()[:16]
 
     def first_difference(self, other: "ReachProblem") -> str | None:
-        """Say where behaviour first depends on another value in another problem, or None.
+        """Say where behaviour first depends on another value in another problem.
 
-        Such as ``"task.tolerance is 0.03, not 0.05"``, with the own value last.
+        Such as ``"task.tolerance is 0.03, not 0.05"``, own value last; None if nowhere.
         """
         if other is self:
             return None
@@ -183,13 +183,13 @@ class ReachProblem(Checked):
         return self.arm_digest == other.arm_digest and self.scene == other.scene
 
     def covers(self, other: "ReachProblem") -> bool:
-        """Whether this is the other problem, or that with further goal regions, at any weights."""
+        """Whether this is the other problem with any goal weights and further regions."""
         wider = set(self.task.goal_regions) >= set(other.task.goal_regions)
         goals = {"goal_regions": other.task.goal_regions, "goal_weights": other.task.goal_weights}
         return wider and self.replace(**goals).first_difference(other) is None
 
     def check_same(self, other: "ReachProblem", what: str) -> None:
-        """Refuse another problem, that of ``what``, by the first field that differs."""
+        """Refuse another problem, that of ``what``, by the first difference."""
         difference = self.first_difference(other)
         if difference is not None:
             raise ProblemError(f"{what} is of another problem: {difference}")
@@ -243,7 +243,7 @@ def _check_names(what: str, given: Mapping[str, Any], *kinds: type) -> None:
 
 
 def _leaves(value: Any, path: str = "") -> Iterator[tuple[str, Any]]:
-    """Values of nested tables with their paths, such as ``scene.obstacles[0].name``."""
+    """Values of nested tables by paths, such as ``scene.obstacles[0].name``."""
     if isinstance(value, Mapping):
         for key, entry in value.items():
             yield from _leaves(entry, f"{path}.{key}" if path else key)
@@ -267,8 +267,8 @@ def scene_names() -> tuple[str, ...]:
 def read_problem(path: Path) -> dict[str, Any]:
     """Read a problem file, as a table of what differs from the defaults.
 
-    Parts are tables; ``arm``, ``scene`` and ``task`` may also be names or files. What is left out
-    is that of the problem ``base``. By default all goal regions of another scene are to be reached.
+    Parts are tables; ``arm``, ``scene`` and ``task`` may also be names or files. The problem
+    ``base`` has the rest. By default all goal regions of another scene are to be reached.
     """
     entries = read_toml(path, "problem")
     regions = PAPER_TASKS[take_base(entries, str(path), PAPER_TASKS, "right")]

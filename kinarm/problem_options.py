@@ -90,7 +90,7 @@ class ProblemOptions(Checked):
 
 
 def say_choices(problems: Iterable[ReachProblem]) -> None:
-    """Print choices where a URDF says nothing on standard error, a line for each arm."""
+    """Print choices where a URDF says nothing on standard error, a line per arm."""
     for specification in dict.fromkeys(problem.arm for problem in problems):
         if specification.source not in arm_names():
             from kinarm.arm import Arm

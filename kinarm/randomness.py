@@ -1,8 +1,7 @@
 """Random generators by purpose, which never share numbers; and even points.
 
-A generator's key is the hash of its purpose's name, followed by own numbers. Trials of an
-evaluation (``kinarm.evaluation.trials.trial_generator``) are older: their keys have two numbers,
-and therefore differ from those of at least four.
+A generator's key is the hash of its purpose's name and own numbers, at least four in all. Trials of
+an evaluation (``kinarm.evaluation.trials.trial_generator``) are older: their keys have two.
 """
 
 import hashlib
@@ -48,5 +47,4 @@ def low_discrepancy_points(count: int, dimensions: int) -> NDArray[np.float64]:
     for _ in range(64):
         root = (1.0 + root) ** (1.0 / (dimensions + 1))
     strides = root ** -np.arange(1.0, dimensions + 1)
-    points: NDArray[np.float64] = (0.5 + np.arange(1, count + 1)[:, None] * strides) % 1.0
-    return points
+    return (0.5 + np.arange(1, count + 1)[:, None] * strides) % 1.0

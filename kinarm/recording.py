@@ -239,8 +239,8 @@ def record_path(
     """Record what an arm does on a path.
 
     It moves straight to each next configuration, as fast as its joints allow and in at least a
-    step. All joints move, whether actuated or not. Contact is tested as in the simulator; a step
-    that touches something is refused and is the last.
+    step. All joints move, whether actuated or not. A step that touches something is refused and is
+    the last.
 
     Parameters
     ----------

@@ -1,7 +1,7 @@
 """The slow reference: the simulator's semantics in plain Pinocchio and Coal, step by step.
 
 It shares no kernel with `kinarm.simulator` and asks Coal about every tested configuration. Tests
-and ``kinarm-bench`` compare rollouts with it.
+and ``kinarm-bench`` compare with it.
 """
 
 from collections.abc import Callable
@@ -111,7 +111,7 @@ class ReferenceSimulator:
         return np.concatenate(parts), float(np.linalg.norm(offset))
 
     def _quaternions(self, q: Array) -> list[Array]:
-        """World orientations of joint frames: quaternions composed along the chain."""
+        """World orientations of joint frames, composed along the chain."""
         world = pin.Quaternion.Identity()
         quaternions = []
         for k in range(self.arm.n_joints):

@@ -21,9 +21,9 @@ def draw_scenarios(
     """Draw starts, shape (count, n_joints) [rad or m], and goals, shape (count, 3) [m].
 
     Goals are uniform over the task's regions. Each actuated joint starts uniformly within its
-    limits, scaled by the start spread, or the arm starts at one of the task's configurations, until
-    the arm touches nothing and its tool is farther from the goal than the tolerance. After 2000
-    attempts that is a `kinarm.ProblemError`.
+    limits, scaled by the start spread, or the arm starts at one of the task's configurations,
+    without contact and farther from the goal than the tolerance. After 2000 attempts that is a
+    `kinarm.ProblemError`.
 
     Parameters
     ----------
@@ -60,8 +60,7 @@ def draw_for_each(
     extent = spread * (arm.upper - arm.lower)
     goals = world.goals.at(_draw(rngs, [count] * len(rngs), 1 + len(world.goals.moving)))
     listed = np.array(task.starts)
-    starts = np.empty((len(goals), arm.n_joints))
-    starts[:] = arm.home
+    starts = np.tile(arm.home, (len(goals), 1))
     pending = np.arange(len(goals))
     for _ in range(START_ATTEMPTS):
         wanted = [len(pending)]
@@ -102,7 +101,7 @@ class ScenarioQueues:
     """Starts and goals of the episodes of many arms, drawn together.
 
     An arm's are those of `draw_scenarios` with its generator, a few at a time. There is room for
-    twice as many as are drawn: once an arm has none, all with room get some.
+    two draws: once an arm has none, all with room get one.
     """
 
     def __init__(self, world: World, n_arms: int) -> None:

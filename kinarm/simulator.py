@@ -31,12 +31,12 @@ class Simulator:
 
     An action in [-1, 1] (clipped) moves its joint by at most its velocity limit times the time
     step, within the limits. A step is tested for contact at evenly spaced configurations up to its
-    end; a move that touches something is refused and ends the episode. An episode also ends when
-    the tool is within the tolerance of the goal, and is truncated at the horizon.
+    end; a move that touches something is refused and ends the episode, as does the tool within the
+    tolerance of the goal. Episodes are truncated at the horizon.
 
-    Results depend on the inputs alone: not on threads, nor on how episodes are batched. Arrays of a
-    wrong shape, entries that are not finite and starts beyond the limits are a
-    `kinarm.InvalidInputError`, starts that touch something a `kinarm.StartInContactError`.
+    Results depend on the inputs alone: not on threads, nor on batches. Arrays of a wrong shape,
+    entries that are not finite and starts beyond the limits are a `kinarm.InvalidInputError`,
+    starts that touch something a `kinarm.StartInContactError`.
 
     Parameters
     ----------
@@ -98,7 +98,7 @@ class Simulator:
 
     @property
     def step_limit(self) -> Array:
-        """Largest move of each actuated joint in a step, shape (n_actions,) [rad or m]."""
+        """Largest move of each actuated joint, shape (n_actions,) [rad or m]."""
         return self.world.rules.step_limit.copy()
 
     def with_tolerance(self, tolerance: float) -> "Simulator":
@@ -241,7 +241,7 @@ class Simulator:
     def _refilled(
         self, control: Control, starts: Array, goals: Array, shift: Array | None
     ) -> Session:
-        """The last rollout's session, which saves time, or another; no other thread gets it."""
+        """The last rollout's session, for this thread alone, or another."""
         with suppress(IndexError):
             session = self._idle.pop()
             if session.refill(control, starts, goals, shift):
@@ -306,14 +306,14 @@ class Simulator:
         touched, asked = contacts.first_contacts(ways, episodes.doubt[paused])
         self.checked_by_coal += asked
         refused = touched != 0
+        resumed: NDArray[np.int64] = paused[~refused]
         episodes.touched[paused] = touched
-        episodes.status[paused[~refused]] = RUNNING
+        episodes.status[resumed] = RUNNING
         episodes.cleared[paused] = ~refused
         if refused.any():
             refuse(paused[refused], session)
             # Only contact as such is known of these.
             episodes.touched[paused[touched < 0]] = 0
-        resumed: NDArray[np.int64] = paused[~refused]
         return resumed
 
     def _follow(self, policy: PolicyFunction, episodes: Episodes) -> None:

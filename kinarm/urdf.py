@@ -1,7 +1,7 @@
 """Robot descriptions: a URDF reduced to an arm, as text for Pinocchio.
 
-Joints between base and tool are kept. Others, and those to be held, become fixed, and joints that
-mimic a held one follow it. Continuous joints get a range, and mesh names become paths.
+Joints between base and tool are kept. Others, and held ones with all that mimic them, become fixed.
+Continuous joints get a range, and mesh names become paths.
 """
 
 import math
@@ -25,7 +25,7 @@ USUAL_TOOL = "tool0"
 """The tool frame's name by ROS's convention."""
 
 FARTHEST_POSITION = 1e6
-"""Largest positions of joints [rad or m]: the kernels' sines are exact up to there."""
+"""Largest positions of joints [rad or m]: kernels' sines are exact up to there."""
 
 
 class Description(NamedTuple):
@@ -95,7 +95,7 @@ def read_urdf(specification: ArmSpecification) -> Description:
 
 
 def _reduced(path: Path, specification: ArmSpecification) -> Description:
-    """Read a URDF, reduced to the tool's chain; errors leave out the file's name."""
+    """Read a URDF, reduced to the tool's chain; errors lack the file's name."""
     robot = read_robot(path)
     joints = read_joints(robot)
     links = [link.get("name", "") for link in robot.findall("link")]

@@ -35,7 +35,7 @@ NUMBERS: dict[str, dict[str, tuple[int, str]]] = {
 """Attributes with numbers: how many, and their defaults."""
 
 RANGES = {"limit": (-1e308, 1e308)} | dict.fromkeys(SHAPES[:4], (1e-9, FARTHEST))
-"""Ranges of these numbers, if not that of lengths; limits need not be used."""
+"""Ranges of these numbers, if not that of lengths."""
 
 NEEDED = {
     "robot": ("link", "joint", "material"),
@@ -72,8 +72,8 @@ def parse_xml(content: bytes) -> Element:
 def read_robot(path: Path) -> Element:
     """Root of a URDF with only the used elements, and numbers as Python writes them.
 
-    Joints get origins and axes. Visual shapes stay unchecked until they are drawn. Raises ArmError
-    if the file is no URDF, a name or shape is missing, or a number is out of range.
+    Joints get origins and axes. Visual shapes stay unchecked. Raises ArmError if the file is no
+    URDF, a name or shape is missing, or a number is out of range.
     """
     try:
         robot = parse_xml(path.read_bytes())
@@ -168,7 +168,7 @@ def read_joints(robot: Element) -> dict[str, TreeJoint]:
 def _check_tree(
     joints: Mapping[str, TreeJoint], links: list[str], carried: Mapping[str, str]
 ) -> None:
-    """Refuse missing or repeated names, and links that do not hang on the base."""
+    """Refuse missing or repeated names, and links that hang on no base."""
     for what, names in (("joint", list(carried.values())), ("link", links)):
         for name, count in Counter(names).items():
             if not name or count > 1:

@@ -1,4 +1,4 @@
-"""The world of a problem: arm and scene, and questions about configurations."""
+"""The world of a problem: arm, scene, and questions about configurations."""
 
 from copy import copy
 from functools import cached_property
@@ -100,9 +100,8 @@ class World(Kinematics):
     @cached_property
     def records(self) -> tuple[Chain, ContactShapes, Rules]:
         """Chain, shapes and rules for the kernels, by their addresses."""
-        parts = (self.arm.chain, self.contact_model.shapes, self.rules)
-        chain, shapes, rules = (recorded(part) for part in parts)
-        return chain, shapes, rules
+        shapes = self.contact_model.shapes
+        return recorded(self.arm.chain), recorded(shapes), recorded(self.rules)
 
     @property
     def n_observations(self) -> int:
@@ -122,7 +121,7 @@ class World(Kinematics):
         return self._begun_at(configurations, goals).observation
 
     def distances(self, configurations: ArrayLike, goals: ArrayLike) -> Array:
-        """Distances from the tool to goals, shape (n,) [m]; arguments as for `observe`."""
+        """Distances from the tool to goals, shape (n,) [m], for `observe`'s arguments."""
         return self._begun_at(configurations, goals).distance
 
     def screen(self, configurations: ArrayLike) -> tuple[Array, NDArray[np.bool_]]:
@@ -144,7 +143,7 @@ class World(Kinematics):
     def proven(self, q: Array) -> tuple[Array, NDArray[np.bool_], NDArray[np.bool_], int]:
         """Tool points of finite configurations [m], and what kernels prove of these.
 
-        That is: which are free, which touch, and how many these are; Coal decides about others.
+        These are: free ones, touching ones, and their number; Coal decides about others.
         """
         n = len(q)
         tools, free, touching = np.empty((n, 3)), np.empty(n, dtype=bool), np.empty(n, dtype=bool)
@@ -156,16 +155,16 @@ class World(Kinematics):
     def clearance(self, configurations: ArrayLike) -> Clearance:
         """Measure how far the closest of the tested pairs is apart, and where.
 
-        Takes configurations as `poses` does. Distances of capsules, spheres, boxes, convex hulls
-        and the ground are exact to 1e-10 m. Coal measures where a cylinder may be closest, and
-        overlapping shapes, of capsules and spheres those deeper than their radii.
+        Takes configurations as `poses` does. Capsules, spheres, boxes, convex hulls and the ground
+        are measured to within 1e-10 m. Coal measures where a cylinder may be closest, and
+        overlaps, those of capsules and spheres if deeper than their radii.
         """
         q, one = one_or_many("configurations", configurations, (self.arm.n_joints,))
         found = measure_clearance(self.contact_model, self._bodies, q, self.threads)
         return Clearance(*(each[0] for each in found)) if one else found
 
     def in_contact(self, configurations: ArrayLike) -> NDArray[np.bool_]:
-        """Whether configurations, given as for `poses`, touch something, shape () or (n,)."""
+        """Whether configurations, as for `poses`, touch something, shape () or (n,)."""
         q, one = one_or_many("configurations", configurations, (self.arm.n_joints,))
         touching = self.screen(q)[1]
         return touching[0] if one else touching

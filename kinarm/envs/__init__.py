@@ -1,4 +1,4 @@
-"""Gymnasium environments, single and as native batches, registered on import."""
+"""Gymnasium environments, single and in batches, registered on import."""
 
 import lazy_loader
 from gymnasium.envs.registration import register

@@ -1,7 +1,4 @@
-"""The frame of every environment: making, use, end, specification and contacts.
-
-It also holds the interface of observations, rewards and ends.
-"""
+"""The common part of all environments: life, specification, contacts, interface."""
 
 import json
 from collections.abc import Mapping
@@ -30,7 +27,7 @@ Observations = Any
 """An array, or a dictionary of arrays, with a row per arm."""
 
 Outcome = tuple[Array, NDArray[np.bool_], NDArray[np.bool_]]
-"""Rewards of a step, and which episodes terminated or were truncated, shape (n,) each."""
+"""Rewards, and which episodes terminated or were truncated, shape (n,) each."""
 
 DTYPES = ("float64", "float32")
 
@@ -90,7 +87,7 @@ class Interface:
         return bounded_space(state_bounds(self.simulator), self._dtype)
 
     def observe(self, observations: Array) -> Observations:
-        """Copy the simulator's observations, shape (n, n_observations), to show them."""
+        """Show copies of the simulator's observations, shape (n, n_observations)."""
         return observations.astype(self._dtype)
 
     def step_outcome(self, episodes: Episodes, result: StepResult) -> Outcome:  # noqa: ARG002
@@ -106,7 +103,7 @@ def one_by_one(observations: Observations, count: int) -> list[Any]:
 
 
 def state_bounds(simulator: Simulator) -> tuple[Array, Array]:
-    """Bounds of an observation, with tolerance for goals and rounding of quaternions."""
+    """Bounds of an observation, with tolerances for goals and quaternions."""
     task = simulator.task
     regions = [simulator.scene.goal_region(name) for name in task.goal_regions]
     ranges = Ranges(
@@ -124,14 +121,14 @@ def bounded_space(bounds: tuple[Array, Array], dtype: np.dtype[Any]) -> Space[An
 
 
 class Lifecycle:
-    """An environment that refuses use before its first reset and after its end."""
+    """An environment that refuses use before a reset and after its end."""
 
     closed: bool = False
     _episodes: Episodes | None = None
 
     @property
     def episodes(self) -> Episodes:
-        """The episodes, one row per arm; refused after the end, and before a reset."""
+        """The episodes, one row per arm; refused before a reset and after the end."""
         self._check_open()
         if self._episodes is None:
             raise ResetNeededError("the environment was never begun: call reset()")
@@ -187,7 +184,7 @@ class ArmEnvironment(Lifecycle):
         self._pictures = EnvPictures(simulator, render_mode, num_envs, **picture)
 
     def _begin(self, rows: NDArray[np.int64], options: Mapping[str, Any] | None = None) -> Episodes:
-        """Begin episodes of some arms; options may set ``start`` and ``goal`` of all."""
+        """Begin episodes of some arms; options may set all ``start`` and ``goal``."""
         n_joints = self.simulator.arm.n_joints
         fixed = fixed_scenario(options, n_joints)
         if "start" in fixed:  # refuse one in contact
@@ -241,7 +238,7 @@ class ArmEnvironment(Lifecycle):
 
 
 def fixed_scenario(options: Mapping[str, Any] | None, n_joints: int) -> dict[str, Array]:
-    """``start`` [rad or m] and ``goal`` [m] that the options of a reset set, if any."""
+    """``start`` [rad or m] and ``goal`` [m] in the options of a reset, if any."""
     given, shapes = dict(options or {}), {"start": (n_joints,), "goal": (3,)}
     unknown = set(given) - set(shapes)
     if unknown:
@@ -252,8 +249,7 @@ def fixed_scenario(options: Mapping[str, Any] | None, n_joints: int) -> dict[str
 def portable_spec(spec: EnvSpec, simulator: Simulator) -> EnvSpec:
     """Complete an environment's specification for JSON.
 
-    It states the horizon. A problem or changes that JSON cannot hold become what
-    `kinarm.ReachProblem.to_json` returns.
+    It states the horizon. What JSON cannot hold becomes `kinarm.ReachProblem.to_json`.
     """
     steps = spec.max_episode_steps or simulator.task.horizon
     given = {name: value for name, value in spec.kwargs.items() if name != "max_episode_steps"}

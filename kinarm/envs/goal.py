@@ -216,5 +216,4 @@ def _distance(first: ArrayLike, second: ArrayLike) -> Array:
     apart = np.asarray(first, dtype=np.float64) - np.asarray(second, dtype=np.float64)
     squares = apart**2
     # Term by term: the sum does not depend on the number of points.
-    distance: Array = np.sqrt(squares[..., 0] + squares[..., 1] + squares[..., 2])
-    return distance
+    return np.sqrt(squares[..., 0] + squares[..., 1] + squares[..., 2])

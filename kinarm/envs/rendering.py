@@ -25,7 +25,7 @@ RENDER_MODES = ("rgb_array", "human")
 OUTCOMES = {SUCCESS: "success", COLLISION: "collision", TRUNCATED: "truncated"}
 
 FULL_SIZE = 4
-"""Largest number of arms with pictures of full size; more share their area."""
+"""Largest number of arms with full-size pictures; more share their area."""
 
 
 class Pictures(tuple[Picture, ...]):

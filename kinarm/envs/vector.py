@@ -104,10 +104,9 @@ class ReachVectorEnv(ArmEnvironment, VectorEnv[Any, Array, NDArray[Any]]):
             if seeds[row] is not None:
                 self._queues.seed(row, np.random.default_rng(seeds[row]))
         episodes = self._begin(rows, chosen)
-        distance = np.zeros(self.num_envs)
-        distance[rows] = episodes.distance[rows]
         mask = np.zeros(self.num_envs, dtype=bool)
         mask[rows] = True
+        distance = np.where(mask, episodes.distance, 0.0)
         shown = self.interface.observe(episodes.observation)
         return shown, {"distance": distance, "_distance": mask}
 

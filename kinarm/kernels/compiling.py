@@ -1,11 +1,11 @@
 """How kernels are compiled: without the GIL and without reordering of floating-point operations.
 
 Numba makes machine code of every function, though helpers reach kernels as LLVM code and are
-optimised once more there. Here helpers are only simplified before they are linked. All that kinarm
-takes from within Numba is here, in `records` and in `lanes`.
+optimised there again. Here helpers are only simplified before they are linked. Only this module,
+`records` and `lanes` use Numba's internals.
 
-Numba trusts cached machine code as long as a kernel's own file is unchanged. Helpers and constants
-of other files are compiled in, too: here the key is a hash of all of them.
+Numba trusts cached machine code as long as a kernel's own file is unchanged. Here the key is a hash
+of all files whose helpers and constants are compiled in.
 """
 
 import gc
@@ -39,7 +39,7 @@ def kernel(function: Function) -> Function:
 
 
 def lean_kernel(function: Function) -> Function:
-    """Compile such a function faster, if it works in lanes and allocates nothing."""
+    """Compile such a function that works in lanes and allocates nothing, faster."""
     return _called_by_python(function, _nrt=False, pipeline_class=LeanCompiler)
 
 
@@ -57,7 +57,7 @@ def _called_by_python(function: Function, **more: Any) -> Function:
 
 
 def inlined(function: Function) -> Function:
-    """Compile a helper that allocates nothing, faster without reference counts."""
+    """Compile a helper that allocates nothing, without reference counts."""
     return _linked(function, forceinline=True, _nrt=False)
 
 
@@ -98,14 +98,14 @@ WITHOUT = {
     "InlineOverloads",
     "NopythonRewrites",
 }
-"""Passes of Numba for what kernels lack: contexts, closures, error messages, spliced functions,
-literals, and expressions of whole arrays. They take a twelfth of the time."""
+"""Passes of Numba for what kernels lack, such as contexts, closures, error messages, literals and
+expressions of whole arrays. They take a twelfth of the time."""
 
 
 class LeanLibrary(JITCodeLibrary):
-    """Code of a kernel in lanes, optimised once; Numba does so twice, to prune reference counts.
+    """Code of a kernel in lanes, optimised once, where Numba prunes reference counts in between.
 
-    LLVM need not make vectors of loops: lanes are vectors.
+    LLVM makes no vectors of loops: lanes are vectors.
     """
 
     def __init__(self, codegen: Any, name: str) -> None:
@@ -181,7 +181,7 @@ class HelperCompiler(KernelCompiler):
 
 
 class KernelCache(FunctionCache):
-    """A kernel's machine code on disk; damage or a missing folder cost only time.
+    """A kernel's machine code on disk; damage costs only time.
 
     Processes with the same sources and versions of Numba and llvmlite share it.
     """
@@ -211,8 +211,8 @@ class KernelCache(FunctionCache):
 def compiled_in(module: str) -> str:
     """Hash of what the kernels of a module are made of.
 
-    It covers the source of the module and of all whose helpers it takes, directly or not, and of
-    those that compile them; and from others, the numbers and the fields of named tuples.
+    It covers the sources of the module, of all whose helpers it takes, directly or not, and of
+    those that compile them; from others, numbers and fields of named tuples.
     """
     parts: dict[str, object] = {"llvmlite": llvmlite.__version__}
     _collect(module, parts)

@@ -1,7 +1,7 @@
 """Closest points of segments, boxes, simplices and hulls.
 
-Those of segments and boxes are for a number or lanes. Of simplices of up to four corners, it is the
-point closest to the origin (Ericson, Real-Time Collision Detection).
+Segments and boxes are of numbers or lanes. In simplices of up to four corners, the point closest to
+the origin is found (Ericson, Real-Time Collision Detection).
 """
 
 import math
@@ -41,7 +41,7 @@ def turned_back(point: Vector, cosine: float, sine: float) -> Vector:
 def closest_to_box(a: Vector, b: Vector, lower: Vector, upper: Vector) -> float:
     """Where on the segment ab, from 0 to 1, it is (nearly) closest to a box.
 
-    Newton's iteration, safeguarded, on the squared distance, which is convex along the segment.
+    A safeguarded Newton iteration on the squared distance, which is convex along it.
     """
     lx, ly, lz = lower
     hx, hy, hz = upper
@@ -143,7 +143,7 @@ def is_beyond(simplex: Array, i: int, j: int, k: int, other: int) -> bool:
 
 @helper
 def shrink(simplex: Array, size: int) -> tuple[int, float, float, float]:
-    """Drop corners without part in the closest point; return how many stay, and the point.
+    """Drop corners not needed for the closest point; return their number, and it.
 
     The rest of a corner's row stays with it. A tetrahedron around the origin stays as it is.
     """
@@ -193,9 +193,7 @@ PRECISION = 1e-9
 
 @kernel
 def distances_from_hull(corners: Array, points: Array, distances: Array) -> None:
-    """Bound the distances of points from the hull of corners from above.
-
-    Each bound is the distance of a (nearly) closest point of the hull.
+    """Bound distances of points from the hull of corners, by (nearly) closest points.
 
     Parameters
     ----------

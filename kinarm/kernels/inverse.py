@@ -1,8 +1,7 @@
 """Inverse kinematics: all configurations for the wanted tool, from many seeds.
 
 Seeds move by damped Newton steps (Levenberg 1944, Marquardt 1963), whose damping shrinks with the
-square of the error, so that they converge quadratically. Eight move side by side in lanes; one that
-has ended makes room for the next.
+square of the error, so that they converge quadratically. Lanes take eight at a time.
 """
 
 import math
@@ -18,16 +17,16 @@ from kinarm.kernels.kinematics import POSE, forward_kinematics, point_jacobian, 
 from kinarm.kernels.lanes import LANES, any_lane, as_lanes, as_numbers, lane_bits, select
 
 PRECISION = 1e-10
-"""Error at arrival: lengths as shares of the arm's reach, and angles [rad]."""
+"""Error at arrival: share of the arm's reach, and angle [rad]."""
 
 ITERATIONS = 48
 """Steps of a seed at most."""
 
 PATIENCE, PROGRESS = 20, 0.98
-"""Steps after which a seed ends whose squared error shrinks less than to this share."""
+"""Steps after which a seed ends whose squared error shrinks too little, and share."""
 
 DAMPING, LEAST_DAMPING = 0.1, 1e-12
-"""Added to the diagonal of J J^T: share of the squared error, and at least."""
+"""Added to the diagonal of J J^T: share of the squared error, and at least this."""
 
 HITS = 3
 """Arrivals at each solution before the search for isolated ones ends."""
@@ -145,7 +144,7 @@ def keep_new(
     hits: NDArray[np.int64],
     found: int,
 ) -> int:
-    """Add a lane's configuration to the solutions, unless it is known or out of the limits.
+    """Add a lane's configuration to the solutions, if it is new and within limits.
 
     The first n joints move. Returns the number of solutions.
     """
@@ -296,10 +295,7 @@ LONGEST_STEP = 0.5
 
 @inlined
 def take_out_blocked(q: Array, lower: Array, upper: Array, step: Array, jacobian: Array) -> bool:
-    """Zero the Jacobian's columns of joints that would leave their limits; say if there are any.
-
-    The other joints then make up for them.
-    """
+    """Zero the Jacobian's columns of joints that would leave limits; tell if there are any."""
     blocked = False
     for k in range(step.shape[0]):
         outward = ((q[0, k] >= upper[k]) & (step[k] > 0.0)) | (
@@ -313,8 +309,8 @@ def take_out_blocked(q: Array, lower: Array, upper: Array, step: Array, jacobian
 
 
 @inlined
-def take_step(q: Array, lower: Array, upper: Array, step: Array) -> float:
-    """Move by a step within the limits; return its largest part [rad or m]."""
+def take_step(q: Array, lower: Array, upper: Array, step: Array) -> None:
+    """Move configurations by a step within the limits."""
     # Scaled as a whole, a step keeps its direction.
     longest = 0.0 * step[0] + LONGEST_STEP
     for k in range(step.shape[0]):
@@ -322,4 +318,3 @@ def take_step(q: Array, lower: Array, upper: Array, step: Array) -> float:
     for k in range(step.shape[0]):
         moved = q[0, k] + LONGEST_STEP / longest * step[k]
         q[0, k] = min(max(moved, lower[k]), upper[k])
-    return longest

@@ -7,7 +7,7 @@ from kinarm.kernels.compiling import Array, Vector, helper, inlined, kernel
 from kinarm.kernels.elementary import sine_cosine
 
 POSE = 16
-"""Entries of a pose: quaternion w x y z, rotation matrix by rows, position."""
+"""Entries of a pose: quaternion w x y z, rotation matrix, position."""
 
 
 @helper
@@ -98,8 +98,8 @@ def rotated_back(poses: Array, frame: int, x: float, y: float, z: float) -> Vect
 def point_jacobian(chain: Chain, poses: Array, point: Vector, jacobian: Array) -> None:
     """Fill in a point's speed per unit speed of each of the first joints [m/rad, or m/m].
 
-    The point lies beyond them; it and the Jacobian are in the world. Of the shape (6, n), rather
-    than (3, n), it also has the angular velocities of the point's link.
+    It lies beyond them, and all is in the world. A Jacobian of the shape (6, n), rather than
+    (3, n), also has the angular velocities of the point's link.
     """
     prismatic, axis = chain.prismatic, chain.axis
     for k in range(jacobian.shape[1]):

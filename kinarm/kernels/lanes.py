@@ -1,10 +1,9 @@
-"""Several episodes in one SIMD value: a type for kernels, and functions that also take numbers.
+"""Several episodes in one SIMD value: a type for kernels, and functions of it or numbers.
 
 A value of type ``lanes`` holds a number for each of `LANES` episodes. Arithmetic, comparisons,
 ``min``, ``max``, ``abs`` and ``math.sqrt`` act on all at once, and lanes mix with numbers. Elements
-of an array from `as_lanes` are such values. So a formula without branches on values serves one
-episode and a block of them, with the same bits: nothing is reordered, and products and sums are not
-contracted.
+of an array from `as_lanes` are such values. So formulas without branches on values serve single
+episodes and blocks, with the same bits: nothing is reordered or contracted.
 """
 
 import math
@@ -34,6 +33,8 @@ WHOLE = ir.VectorType(ir.IntType(64), LANES)
 class LanesType(types.Type):
     """Type of a number for each episode."""
 
+    vector = NUMBERS
+
     def __init__(self) -> None:
         super().__init__(name=f"lanes{LANES}")
 
@@ -49,6 +50,8 @@ class LanesType(types.Type):
 class MaskType(types.Type):
     """Type of a truth value for each episode."""
 
+    vector = BITS
+
     def __init__(self) -> None:
         super().__init__(name=f"mask{LANES}")
 
@@ -57,15 +60,10 @@ lanes, mask = LanesType(), MaskType()
 
 
 @register_model(LanesType)
-class _LanesModel(models.PrimitiveModel):
-    def __init__(self, manager: Any, kind: types.Type) -> None:
-        super().__init__(manager, kind, NUMBERS)
-
-
 @register_model(MaskType)
-class _MaskModel(models.PrimitiveModel):
+class _VectorModel(models.PrimitiveModel):
     def __init__(self, manager: Any, kind: types.Type) -> None:
-        super().__init__(manager, kind, BITS)
+        super().__init__(manager, kind, kind.vector)
 
 
 @lower_cast(types.Float, lanes)
@@ -98,7 +96,7 @@ def _teach(
     arity: int,
     instruction: Callable[..., Any],
 ) -> None:
-    """Let a Python function or operator act on lanes or masks by an instruction."""
+    """Let a Python function or operator act on lanes or masks."""
 
     class Template(AbstractTemplate):
         metadata = FIRST
@@ -225,18 +223,18 @@ def lane_bits(_: Any, condition: types.Type) -> Any:
 
 @instruction
 def as_lanes(_: Any, array: types.Array) -> Any:
-    """View a C-contiguous array of float64, of `LANES` along its last axis, as one of lanes."""
+    """View a contiguous array of float64, with `LANES` in its last axis, as lanes."""
     return _viewed(array, types.Array(lanes, array.ndim - 1, "C", aligned=False))
 
 
 @instruction
 def as_numbers(_: Any, array: types.Array) -> Any:
-    """View a C-contiguous array of lanes as one of float64, with one axis more."""
+    """View a contiguous array of lanes as one of float64, with one axis more."""
     return _viewed(array, types.Array(types.float64, array.ndim + 1, "C"))
 
 
 def _viewed(array: types.Array, view: types.Array) -> Any:
-    """Signature and code of a view that adds or drops the axis of the episodes."""
+    """Signature and code of a view that adds or drops the last axis."""
 
     def code(context: Any, builder: Any, _signature: Any, arguments: Any) -> Any:
         from numba.core import cgutils

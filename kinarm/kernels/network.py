@@ -82,8 +82,8 @@ def act(
 ) -> None:
     """Let a network choose an action, shape (1, n_actions), for inputs, shape (1, n_inputs).
 
-    Layers, activations and weights are those of `kinarm.episodes.Control`; weights are numbers, or
-    lanes if each episode has its own. ``hidden`` holds two layers by turns.
+    Layers, activations and weights, numbers or lanes of own ones, are those of
+    `kinarm.episodes.Control`. ``hidden`` holds two layers by turns.
     """
     n_layers, offset = layers.shape[0] - 1, 0
     for layer in range(n_layers):
@@ -125,13 +125,12 @@ def choose_actions(control: Control, shared: int, row: NDArray[np.int64], block:
                 for axis in range(held.shape[1]):
                     held[0, axis, lane] = control.actions[row[lane], column, axis]
     else:
-        mirrored = signs.shape[0] > 0
         # Networks with a mirror know goals on the right alone: observations of goals on the left
         # are reflected, and so are the actions.
         for i in range(signs.shape[0]):
             given = block.observation[0, i]
             block.seen[0, i] = select(reflected, signs[i] * given, given)
-        seen = block.seen if mirrored else block.observation
+        seen = block.seen if signs.shape[0] > 0 else block.observation
         if shared >= 0:
             weights = control.weights[shared]
             act(layers, activations, weights, seen, block.hidden, block.action)

@@ -1,16 +1,15 @@
 """Separating planes between two bodies, for a number or lanes.
 
-A rounded polytope, the hull of a few corners widened by a radius, encloses each body. A pair keeps
-a plane above its first body, the carrier, with which it moves; the least height of the second, the
-mover, above it is a lower bound of their distance. The ground's plane is its surface.
+A rounded polytope, the hull of a few corners widened by a radius, encloses each body. A pair's
+plane lies above its first body, the carrier, and moves with it; the least height of the second, the
+mover, above it bounds their distance from below. The ground's plane is its surface.
 
 A plane has five entries: unit normal x, y, z in the joint frame that carries it, offset along
-the normal, and the least height of the mover above it, when that was last asked for [m].
+the normal, and the mover's least height when last asked for [m].
 
 The best plane follows from the distance algorithm of Gilbert, Johnson and Keerthi. In the carrier's
 frame it looks for the point closest to the origin of all differences of points of mover and
-carrier: in a simplex of at most four differences of corners, which those lowest along the way found
-so far renew.
+carrier, in a simplex of at most four differences of corners, renewed by the lowest ones.
 """
 
 import math
@@ -40,7 +39,7 @@ CLOSE = 1e-7
 """Precision of the distance [m]."""
 
 COARSE = 0.02
-"""Precision of the distance of bodies that are far apart, as a share of it."""
+"""Precision of the distance of far bodies, as a share of it."""
 
 
 @inlined
@@ -53,7 +52,7 @@ def axis_in_world(shapes: ContactShapes, body: int, poses: Array) -> tuple[Vecto
 
 @inlined
 def lowest(shapes: ContactShapes, body: int, x: float, y: float, z: float) -> float:
-    """Smallest coordinate of a body's corners along a vector of its joint frame."""
+    """Least coordinate of a body's corners along a vector of its joint frame."""
     corners, first, last = shapes.corners, shapes.bodies[body, 0], shapes.bodies[body, 1]
     least = x * corners[first, 0] + y * corners[first, 1] + z * corners[first, 2]
     for i in range(first + 1, last):
@@ -86,8 +85,7 @@ def height_above(
 def propose(shapes: ContactShapes, pair: int, poses: Array, plane: Array, row: int) -> None:
     """Fill in a row of the planes with a likely plane for a pair, without its height.
 
-    Its normal leads from the carrier's axis, or the box about an obstacle, to the mover's axis. Its
-    height tells whether it separates the two.
+    Its normal leads from the carrier's axis, or the box about an obstacle, to the mover's axis.
     """
     carrier, mover = shapes.planes[pair, 0], shapes.planes[pair, 1]
     if carrier == GROUND:
@@ -153,7 +151,7 @@ def separate(
 ) -> float:
     """Find a plane that separates a pair well; return the mover's height above it [m].
 
-    Takes poses of numbers. The plane, shape (1, PLANE), is the first one, and becomes a better one.
+    Takes poses of numbers. The plane, shape (1, PLANE), is replaced by a better one.
     ``relative``, shape (1, POSE), and ``simplex``, shape (4, 3), are work space.
     """
     carrier, mover = shapes.proxies[pair, FINE, 0], shapes.proxies[pair, FINE, 1]

@@ -1,13 +1,13 @@
 """Proof that steps are free of contact, or that bodies touch, for a block of episodes.
 
-A step moves the arm from q to q' and is tested at n configurations q + k/n (q' - q). The height of
-the second body of a pair above the plane of the first (`kinarm.kernels.planes`) is known at q.
+A step moves the arm from q to q' and is tested at n configurations q + k/n (q' - q). The height h
+of the second body of a pair above the plane of the first (`kinarm.kernels.planes`) is known at q.
 Along the step it is the least height of some corners, whose second derivative is bounded by a
 *bend* c: at the share s it is at least (1 - s) h + s h' - s (1 - s) c / 2. Where that proves
-nothing, a better plane is taken, and then the configurations between are looked at one by one.
+nothing, a better plane is taken, and then each configuration between.
 
-Contact is proven between capsules, obstacles and the ground, which are known exactly: two of their
-points that are closer than the radii about them prove an overlap. Other shapes prove nothing.
+Contact is proven between capsules, obstacles and the ground, whose shapes are exact: two of their
+points that are closer than the radii about them prove an overlap.
 """
 
 import math
@@ -43,8 +43,8 @@ def is_apart(bound: float) -> bool:
 def twist_step(block: Block) -> None:
     """Fill in how the axes of a block move together in a step.
 
-    The second derivative of a point by two axes is no larger than its speed by the later one, whose
-    motion the earlier one only turns.
+    The second derivative of a point by two axes is at most its speed by the later one, which the
+    earlier one only turns.
     """
     n_axes = block.twist.shape[0]
     for first in range(n_axes):
@@ -59,7 +59,7 @@ def twist_step(block: Block) -> None:
 def prove_step(shapes: ContactShapes, tested: int, poses: Array, block: Block) -> float:
     """Renew the heights of all pairs; return a bound that shows which steps are free.
 
-    Takes the poses at the target, and for all pairs one bend, larger than any of theirs.
+    Takes the poses at the target. One bend, larger than any pair's, serves for all.
     """
     twist_step(block)
     bend = 0.0 * block.q[0, 0]
@@ -81,8 +81,7 @@ def renew_planes(
 ) -> float:
     """Prove steps by the pairs' own bends, or by new planes; return the bound.
 
-    ``stale`` says whose steps are to be proven. Takes the poses ``before`` the step and at the
-    target.
+    ``stale`` says whose steps are to be proven. Poses are ``before`` the step and at the target.
     """
     least = 0.0 * block.q[0, 0] + 1.0
     n_pairs, share = shapes.planes.shape[0], 1.0 / tested
@@ -116,7 +115,7 @@ def renew_planes(
 
 @inlined
 def open_configurations(before: float, after: float, bend: float, tested: int) -> int:
-    """Bit k - 1 is set if heights before and after do not prove configuration k free."""
+    """Bit k - 1 is set if the heights do not prove configuration k free."""
     unproven = 0
     for k in range(1, tested + 1):
         share = k / tested
@@ -185,7 +184,7 @@ def prove_alone(
 def is_proven_apart(
     pair: int, lane: int, shapes: ContactShapes, block: Block, alone: Alone
 ) -> bool:
-    """Whether a pair is proven apart at ``alone.before``, by its or a better plane."""
+    """Whether its or a better plane proves a pair apart at ``alone.before``."""
     take(block.planes, pair, lane, alone.plane, 0)
     height = height_above(shapes, pair, FINE, alone.before, alone.plane, 0)
     if not is_apart(height) and shapes.planes[pair, 0] != GROUND:
@@ -195,7 +194,7 @@ def is_proven_apart(
 
 @inlined
 def place_between(k: int, tested: int, lane: int, chain: Chain, block: Block, alone: Alone) -> None:
-    """Fill in an episode's poses at configuration k of its step, below ``tested``."""
+    """Fill in an episode's poses at configuration k < ``tested`` of its step."""
     q, target = as_numbers(block.q), as_numbers(block.target)
     for joint in range(block.q.shape[1]):
         start, end = q[0, joint, lane], target[0, joint, lane]
@@ -254,7 +253,7 @@ def is_exact(shapes: ContactShapes, pair: int) -> bool:
 
 @helper
 def overlap(shapes: ContactShapes, pair: int, poses: Array) -> float:
-    """Lower bound of the depth of an exact pair's overlap [m]; negative if apart."""
+    """Lower bound of an exact pair's overlap [m]; negative if apart."""
     kind, first, second = shapes.pairs[pair, 0], shapes.pairs[pair, 1], shapes.pairs[pair, 2]
     a, b = axis_in_world(shapes, first, poses)
     radius = shapes.capsules[first, 6]
@@ -299,7 +298,7 @@ def first_contact(
 ) -> int:
     """Number, from 1, of the pair that surely touches first in a step; 0 if none is.
 
-    Looks at the first configuration that is not proven free by the bits of ``doubt``.
+    Looks at the first configuration that ``doubt`` does not show as free.
     """
     k = 1
     while doubt >> (k - 1) & 1 == 0:

@@ -1,8 +1,8 @@
 """Arrays and numbers by one address, instead of array by array.
 
-Numba hands over all that is in a named tuple, from Python to a kernel, and from a kernel to each
-helper. A `Record` is a table of addresses, shapes and numbers, made once. Kernels take its address,
-and see what is in it as attributes, as of a named tuple.
+Numba hands over all that is in a named tuple, to kernels and to each helper. A `Record` is a table
+of addresses, shapes and numbers, made once. Kernels take its address, and read its attributes as of
+a named tuple.
 """
 
 import hashlib
@@ -94,8 +94,8 @@ class Record:
 def recorded(values: Any) -> Any:
     """Record of a named tuple of arrays, records and numbers, which it keeps alive.
 
-    Kernels and helpers take it instead of the tuple. Arrays must be contiguous, in C order. Records
-    are returned themselves.
+    Kernels take it instead of the tuple. Arrays must be contiguous, in C order. Records are
+    returned themselves.
     """
     return values if isinstance(values, Record) else Record(*table(values), values)
 
@@ -218,7 +218,7 @@ infer_getattr(type("RecordAttribute", (AttributeTemplate,), _resolved))
 
 @lower_getattr_generic(RecordType)
 def _read_field(context: Any, builder: Any, record: RecordType, table: Any, name: str) -> Any:
-    """Read from the table, without references: the record keeps its fields alive."""
+    """Read from the table, uncounted: the record keeps its fields alive."""
     kind, place = record.fields[name], record.places[name]
 
     def word(offset: int, form: Any) -> Any:

@@ -37,7 +37,7 @@ from kinarm.kernels.session import (
 def begin(counters: NDArray[np.int64], session: Session, rows: NDArray[np.int64]) -> int:
     """Start episodes at their ``q`` and ``goal``; ``rows``, shape (n,), tells which.
 
-    Returns how many pause, with starts not proven free. Threads may share them as in `advance`.
+    Returns how many pause, as not proven free. Threads may share them as in `advance`.
     """
     block, alone = session.block, session.alone
     chain, shapes, episodes = session.chain, session.shapes, session.episodes
@@ -78,10 +78,8 @@ def advance(counters: NDArray[np.int64], session: Session) -> int:
     """Advance the running episodes, a block at a time; return how many paused.
 
     Each goes on until it ends, reaches its ``stop`` or pauses before a step that is proven neither
-    free nor to touch; then the next one takes its lane.
-
-    Threads may share them, each with its own session: the first of the counters, zero at first,
-    numbers the next episode.
+    free nor to touch; then the next one takes its lane. Threads with own sessions may share them:
+    the first counter, zero at first, numbers the next episode.
     """
     chain, shapes, rules = session.chain, session.shapes, session.rules
     control, episodes = session.control, session.episodes
@@ -195,7 +193,7 @@ def next_waiting(counters: NDArray[np.int64], episodes: Episodes) -> int:
 
 @lean_kernel
 def allow_one_step(session: Session) -> bool:
-    """Let every episode go on by one step; return whether all actions are finite."""
+    """Let episodes go on by one step; return whether all actions are finite."""
     steps, stop, actions = session.episodes.steps, session.episodes.stop, session.control.actions
     nothing = 0.0
     for e in range(steps.shape[0]):

@@ -1,7 +1,4 @@
-"""Everything of a batch of episodes in one object, with work space.
-
-That is for a block of episodes, side by side in lanes, and for a single one of them.
-"""
+"""Everything of a batch of episodes in one object, with work space for a block in lanes."""
 
 from functools import cache
 from typing import Any, NamedTuple, TypeAlias
@@ -28,7 +25,7 @@ Alone: TypeAlias = Any
 
 
 def work_space(**sizes: int) -> tuple[Block, Alone]:
-    """Records of a block and of a single episode's space; sizes are those of `layouts`."""
+    """Records of a block and a single episode's space, of sizes as in `layouts`."""
     block, alone = layouts(**sizes)
     return block.record(), alone.record()
 

@@ -1,4 +1,4 @@
-"""The viewer: pictures, pages that play recordings offline, and live scenes."""
+"""The viewer: pictures, pages of recordings, and live scenes."""
 
 import lazy_loader
 

@@ -18,7 +18,7 @@ TARGET, EYE = (0.05, 0.1, 0.38), (-2.42, 1.9, 1.5)
 replay page, but with room for an upright arm."""
 
 NEAR, FAR = 1.0, 1.45
-"""Stages of a radius between these are seen from there; others from nearer or farther [m]."""
+"""Stages of a radius between these are seen from there; others scale that [m]."""
 
 
 class Camera(NamedTuple):
@@ -97,7 +97,7 @@ class Camera(NamedTuple):
 
 
 def stage_scale(arm: Arm, scene: Scene) -> float:
-    """Scale of a camera's distance for an arm and goals; 1 if they reach about 1 m."""
+    """Scale of a camera's distance for arm and goals; 1 for a reach of about 1 m."""
     corners = [corner for region in scene.goal_regions for corner in (region.lower, region.upper)]
     radius = max([arm.reach, *(float(np.linalg.norm(corner)) for corner in corners)])
     return radius / min(max(radius, NEAR), FAR)

@@ -1,4 +1,4 @@
-"""Draw an arm and its scene into a Meshcat window, for a page or a live one."""
+"""Draw an arm and its scene into a Meshcat window, for pages and live."""
 
 import struct
 import threading
@@ -55,7 +55,7 @@ class DrawnScene:
     """The drawing commands that still count; any thread may add some.
 
     A command replaces an earlier one for the same part of a node: the scene grows with what is
-    seen, not with time, and slow pages skip what is past. The same drawing gives the same bytes.
+    seen, not with time. The same drawing gives the same bytes.
 
     Attributes
     ----------
@@ -99,7 +99,7 @@ class DrawnScene:
             self._changed.notify_all()
 
     def changes(self) -> Iterator[bytes]:
-        """All commands that count, then those that come, until the scene is closed."""
+        """All commands that count, then new ones, until the scene is closed."""
         seen = 0
         while True:
             with self._changed:
@@ -124,7 +124,7 @@ class _Described(Object):
 
 
 def put(window: Visualizer, finish: Finish, *meshes: Mesh) -> None:
-    """Show meshes with one finish; the longest side has 65535 steps for corners."""
+    """Show meshes with one finish; the longest side has 65535 steps."""
     vertices, normals, faces = Mesh.joined(meshes).with_normals()
     low, high = vertices.min(axis=0), vertices.max(axis=0)
     middle, step = (low + high) / 2, max((high - low).max(), 1e-9) / 65534
@@ -245,7 +245,7 @@ def _grid_lines() -> NDArray[np.float64]:
 
 
 def aim_camera(window: Visualizer, scale: float = 1.0) -> None:
-    """Look at the arm from behind its right; see `kinarm.viewer.camera.stage_scale`."""
+    """Look from behind the arm's right; see `kinarm.viewer.camera.stage_scale`."""
     camera = window["/Cameras/default/rotated/<object>"]
     camera.set_property("fov", FIELD_OF_VIEW)
     camera.set_property("position", [scale * value for value in CAMERA_PLACE])
@@ -258,7 +258,7 @@ def draw_goal(window: Visualizer, problem: ReachProblem) -> None:
 
 
 def draw_arm(window: Visualizer, arm: Arm) -> list[Visualizer]:
-    """Draw an arm as nested groups; return base and joints, placed in their parents."""
+    """Draw an arm as nested groups; return base and joints."""
     frames = [window]
     for number in range(1, arm.n_joints + 1):
         frames.append(frames[-1][f"axis_{number}"])

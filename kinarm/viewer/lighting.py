@@ -1,7 +1,7 @@
 """Light on a stage, as on the replay page: sun, fill, sky, and a bright room that is reflected.
 
-Kernels find the light that a surface sends out, by three.js' standard material. Lengths are in
-metres, shapes of arrays in brackets, and colours linear red, green and blue.
+Kernels light surfaces by three.js' standard material. Lengths are in metres, shapes of arrays in
+brackets, and colours linear red, green and blue.
 """
 
 import math
@@ -30,7 +30,7 @@ ROOM = (
     (0xE8F0FF, (0.1, 6, 3), (-5.5, 0, 2.5)),
     (0xFFF4E4, (6, 0.1, 2.4), (0, -5.6, 3)),
 )
-"""Colours, sizes and centres [m] of the boxes that are reflected: walls, then panels."""
+"""Colours, sizes and centres [m] of reflected boxes: walls, then panels."""
 
 SHADOW_REACH = 1.75
 """Half the extent of the shadow map, about the origin [m]."""
@@ -116,7 +116,7 @@ def _look_up(table: Array, cell: Cell, channel: int) -> float:
 
 @inlined
 def sunlit(lights: Lights, place: Vector) -> float:
-    """Share of the sun that reaches a place, averaged over three by three texels."""
+    """Share of the sun that reaches a place, averaged over 3 x 3 texels."""
     x, y, z = place
     m, shadow = lights.sunward, lights.shadow
     u = m[0, 0] * x + m[0, 1] * y + m[0, 2] * z + m[0, 3] - 1.5
@@ -233,7 +233,7 @@ def light_up(
 
 
 def lit(finishes: Sequence[Finish], texels: int) -> tuple[Materials, Lights]:
-    """Finishes in the replay page's light, with an empty shadow map of texels a side."""
+    """Finishes in the replay page's light, with an empty shadow map."""
     places = np.array([SUN_PLACE, FILL_PLACE])
     directions = places / np.linalg.norm(places, axis=1, keepdims=True)
     right = np.cross((0.0, 0.0, 1.0), directions[0])
@@ -269,7 +269,7 @@ def irradiance_map() -> Array:
 
 @lru_cache(maxsize=64)
 def reflection_map(roughness: float) -> Array:
-    """Light of the room as a surface of a roughness mirrors it, shape (n, n, 3)."""
+    """The room's light as a surface of a roughness mirrors it, shape (n, n, 3)."""
     square = roughness**4
 
     def lobe(cosine: Array) -> Array:
@@ -280,7 +280,7 @@ def reflection_map(roughness: float) -> Array:
 
 
 def _blurred(nodes: int, lobe: Callable[[Array], Array]) -> Array:
-    """Mean light of the room, weighted by a function of the cosine to each node."""
+    """Mean light of the room, weighted by a function of the cosine."""
     directions = _even_directions()
     radiance = _room_radiance(directions)
     weights = lobe(_node_directions(nodes) @ directions.T)
@@ -298,7 +298,7 @@ def _even_directions() -> Array:
 
 
 def _node_directions(nodes: int) -> Array:
-    """Unit vectors of the nodes of an octahedral map by rows, shape (nodes ** 2, 3)."""
+    """Unit vectors of an octahedral map's nodes by rows, shape (nodes ** 2, 3)."""
     v, u = np.meshgrid(*[np.linspace(-1, 1, nodes)] * 2, indexing="ij")
     z = 1 - np.abs(u) - np.abs(v)
     side_u, side_v = np.copysign(1, u), np.copysign(1, v)

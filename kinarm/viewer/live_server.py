@@ -1,4 +1,4 @@
-"""Scenes and problems with moving arms, served to browsers while they are drawn."""
+"""Scenes and problems with moving arms, served live to browsers."""
 
 import errno
 import sys

@@ -1,4 +1,4 @@
-"""Triangle meshes of profiles and primitives, with normals that keep sharp edges."""
+"""Triangle meshes of profiles and primitives, with sharp edges."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ class Mesh:
         return Mesh(places, faces[(faces != np.roll(faces, 1, axis=1)).all(axis=1)])
 
     def with_normals(self) -> tuple[Array, Array, NDArray[np.int64]]:
-        """Vertices, normals and faces; corners are split where faces meet at an edge."""
+        """Vertices, normals and faces, with corners split at edges."""
         if self.normals is not None:
             return self.vertices, self.normals, self.faces
         places, welded = np.unique(np.round(self.vertices, 6), axis=0, return_inverse=True)
@@ -72,7 +72,7 @@ class Mesh:
 
 
 def _corner_normals(corners: NDArray[np.int64], weighted: Array, flat: Array) -> Array:
-    """Mean normal, at each face's corners, of the faces that meet there without an edge."""
+    """Mean normal, at each face's corners, of the faces that meet without an edge."""
     empty = np.repeat(np.linalg.norm(weighted, axis=1) == 0, 3)
     solid = np.flatnonzero(~empty)  # else a trace at rest has thousands
     order = solid[np.argsort(corners[solid], kind="stable")]
@@ -171,7 +171,7 @@ def _convex_hull(points: Array) -> Mesh:
 
 
 def capsule(length: float, radius: float) -> Mesh:
-    """A cylinder along z with half spheres at its ends; a sphere if it is 0 m long."""
+    """A cylinder along z with half spheres at its ends; a sphere at length 0 [m]."""
     turn = np.linspace(0, np.pi / 2, 9)
     low = [(-length / 2 - radius * np.cos(t), radius * np.sin(t)) for t in turn]
     return lathe([*low, *[(-position, r) for position, r in reversed(low)]])

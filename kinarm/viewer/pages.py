@@ -1,7 +1,4 @@
-"""Pages of recordings and arms: one HTML file that needs no network, only a browser with WebGL.
-
-It holds Meshcat's viewer and all that it shows, and depends on nothing else.
-"""
+"""Pages of recordings and arms: one HTML file that needs no network, only a browser with WebGL."""
 
 import base64
 import gzip
@@ -53,7 +50,7 @@ BARE_GROUND = Scene(obstacles=(), goal_regions=())
 
 @dataclass(frozen=True)
 class HtmlPage:
-    """A page that refers to nothing outside of its ``html``. A notebook shows it."""
+    """A page whose ``html`` refers to nothing else. A notebook shows it."""
 
     html: str
 
@@ -103,7 +100,7 @@ def page_html(
 
 
 def arm_data(arm: Arm, scene: Scene) -> dict[str, Any]:
-    """Describe an arm: its axes and tool, joints of its bodies, colour and size."""
+    """Describe an arm: axes, tool, joints of its bodies, colour and size."""
     chain, painted = arm.chain, Counter[int]()
     columns = chain.translation, chain.rotation, chain.axis, chain.prismatic
     for part in arm_parts(arm):
@@ -293,7 +290,7 @@ def arm_page(
     *,
     scene: Scene = BARE_GROUND,
 ) -> ArmPage:
-    """Make a page with a slider for each joint of an arm, which shows contact as it happens.
+    """Make a page with a slider for each joint of an arm, which shows contact.
 
     In the browser, the page tests the same pairs of shapes as the simulator. Its verdicts are
     Coal's, except for shapes that are less than 1e-6 m from touching.

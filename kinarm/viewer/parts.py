@@ -1,4 +1,4 @@
-"""Drawn parts of arms, obstacles and the cube: sizes, finishes and colours."""
+"""Drawn parts of arms, obstacles and the cube, with finishes and colours."""
 
 from typing import NamedTuple
 
@@ -25,7 +25,7 @@ CUBE_CHAMFER = 0.08
 """Of the cube's edges, as a share of their length."""
 
 REFLECTANCE = 0.7
-"""Of white lacquer; a white that reflects everything shows no shape in bright light."""
+"""Of white lacquer; a white of 1 shows no shape in bright light."""
 
 
 class Finish(NamedTuple):
@@ -90,17 +90,15 @@ def channels(colour: int) -> Array:
 def to_linear(encoded: ArrayLike) -> Array:
     """Decode sRGB."""
     value = np.asarray(encoded, dtype=float)
-    linear: Array = np.where(value <= 0.04045, value / 12.92, ((value + 0.055) / 1.055) ** 2.4)
-    return linear
+    return np.where(value <= 0.04045, value / 12.92, ((value + 0.055) / 1.055) ** 2.4)
 
 
 def to_srgb(linear: ArrayLike) -> Array:
     """Encode as sRGB."""
     value = np.asarray(linear, dtype=float)
-    encoded: Array = np.where(
+    return np.where(
         value <= 0.0031308, 12.92 * value, 1.055 * np.maximum(value, 0) ** (1 / 2.4) - 0.055
     )
-    return encoded
 
 
 def obstacle_meshes(obstacle: Obstacle, scene: Scene) -> list[Mesh]:

@@ -1,4 +1,4 @@
-"""Pictures of an arm at work, in software: no display, graphics card or OpenGL."""
+"""Pictures of an arm at work, in software: no display or OpenGL."""
 
 from collections.abc import Iterable
 
@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 from kinarm.arm import Arm
 from kinarm.collision import Contact
 from kinarm.errors import UnknownNameError, finite_array, whole_number
+from kinarm.kernels.compiling import Array
 from kinarm.problem import ProblemLike, ReachProblem
 from kinarm.recording import OUTCOMES
 from kinarm.viewer.camera import Camera, CameraLike, stage_scale
@@ -29,19 +30,17 @@ from kinarm.viewer.parts import (
 )
 from kinarm.viewer.visual_shapes import arm_parts, link_joints
 
-Array = NDArray[np.float64]
-
 SAMPLES = np.array([(0.375, 0.125), (0.875, 0.375), (0.125, 0.625), (0.625, 0.875)])
-"""Places in a pixel, no two in a row or column: edges of any slope are smooth."""
+"""Places in a pixel, no two in a row or column, for edges of any slope."""
 
 GRID_WIDTH = 1 / 600
 """Width of the floor's lines, as a share of the picture's height."""
 
 FADING = (0.2, 3.8)
-"""The floor fades between these, plus the camera's distance from the origin [m]."""
+"""The floor fades between these, beyond the camera's distance [m]."""
 
 SHADOW_DETAIL, SHADOW_SIZES = 2, (256, 2048)
-"""Texels of the shadow map per pixel along the picture, and least and most of them."""
+"""Texels of the shadow map per pixel, and least and most of them."""
 HALO_OPACITY = 0.16
 FLASH_OPACITY, FLASH_SWELL = 0.55, 1.5
 
@@ -231,7 +230,7 @@ class TriangleScene:
         return Surfaces(places, normals, np.empty_like(places), faces, materials)
 
     def emission(self, outcome: str | None, touching: Iterable[str]) -> Array:
-        """Light of each material, shape (n, 3): of a reached cube and of bodies that touch."""
+        """Light of each material, shape (n, 3): of a reached cube and of contact."""
         joints = {self._links[body] for body in touching if body in self._links}
         light = np.zeros((len(self._owners), 3))
         for material, (frame, finish) in enumerate(self._owners):

@@ -44,10 +44,10 @@ AXES = np.array([(0, 0, 1), (0, 1, 0), (0, -1, 0), (-1, 0, 0), (0, -1, 0), (-1, 
 """Axes of the joints of an arm that looks like that."""
 
 TOOL_RADIUS = 0.012
-"""Radius of the ball at the tool point; for a reach below 1 m, times the reach [m]."""
+"""Radius of the tool's ball; for a reach below 1 m, times the reach [m]."""
 
 TOLERANCE = 3e-4
-"""How far a simplified surface may lie from the planes of its triangles before [m]."""
+"""Distance of a simplified surface from the former triangles' planes [m]."""
 
 UNKNOWN = -1
 """A colour that a file does not state."""
@@ -66,12 +66,12 @@ UNIVERSAL_ROBOTS = np.array(
 """Colours of the maker's caps, links, joints, rims and seals."""
 
 DIMMING, MOST_TIMES, SAME_COLOUR = 0.8, 6, 0.003
-"""The meshes in ``ur_description`` went through a modeller a few times, which each time left them
-this share of their light; some links went through it more often than others."""
+"""The meshes in ``ur_description`` went through a modeller, some more often than others, which each
+time left them this share of their light."""
 
 
 class PaintedMesh(NamedTuple):
-    """Triangles of one material with its colour 0xRRGGBB, or None if it is not stated."""
+    """Triangles of one material with its colour 0xRRGGBB, None if unstated."""
 
     mesh: Mesh
     colour: int | None
@@ -81,8 +81,8 @@ class PaintedMesh(NamedTuple):
 def arm_parts(arm: Arm) -> tuple[ArmPart, ...]:
     """All parts of an arm.
 
-    One with the geometry of the shipped ones looks industrial; any other shows the visual shapes of
-    its URDF, or its collision shapes where none can be read, which is logged.
+    It looks industrial with the geometry of the shipped ones. Any other arm shows the visual shapes
+    of its URDF, or its collision shapes where none can be read, which is logged.
     """
     if looks_industrial(arm):
         return tuple(industrial_parts(arm))
@@ -149,7 +149,7 @@ def collision_parts(arm: Arm) -> tuple[ArmPart, ...]:
 
 
 def _placed_part(joint: int, colour: int | None, mesh: Mesh, placement: pin.SE3) -> ArmPart:
-    """A shape where it stands on a joint; without a colour, links alternate two."""
+    """A shape on a joint; without colours, links alternate two."""
     finish = PLAIN[joint % len(PLAIN)] if colour is None else shape_finish(colour)
     return ArmPart(joint, finish, mesh.moved(placement.translation, placement.rotation))
 
@@ -227,7 +227,7 @@ def _numbers(element: Element, name: str, where: str = "a visual shape") -> tupl
 def read_mesh_file(path: Path, scale: Sequence[float]) -> tuple[PaintedMesh, ...]:
     """Read a mesh file and simplify it, or look it up in the cache.
 
-    Nodes are placed and units converted as the file says. Its up axis is ignored, as in ROS and
+    Nodes are placed and units converted as the file says, without its up axis, as in ROS and
     Pinocchio, so that looks and collision shapes agree. ``scale`` are factors along the axes.
 
     Raises
@@ -317,7 +317,7 @@ def _colour(geometry: Any, path: Path) -> int | None:
 
 
 def original_colour(path: Path, colour: NDArray[np.float64]) -> NDArray[np.float64]:
-    """The maker's colour, shape (3,), of a part for one that a mesh file states."""
+    """The maker's colour, shape (3,), for one that a mesh file states."""
     if "ur_description" in path.parts:
         for times in range(MOST_TIMES + 1):
             apart = np.abs(UNIVERSAL_ROBOTS * DIMMING**times - colour).max(axis=1)

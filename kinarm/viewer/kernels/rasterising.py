@@ -53,7 +53,7 @@ class Surfaces(NamedTuple):
 
 @inlined
 def edge(a: Vector, b: Vector) -> Vector:
-    """Coefficients of x, y and 1 in a function that is zero on a line through two corners."""
+    """Coefficients of x, y and 1 that are zero on a line through two corners."""
     ax, ay, aw = a
     bx, by, bw = b
     return ay * bw - by * aw, aw * bx - bw * ax, ax * by - bx * ay
@@ -61,7 +61,7 @@ def edge(a: Vector, b: Vector) -> Vector:
 
 @inlined
 def _within(a: float, b: float, c: float, row: int, first: int, last: int) -> tuple[int, int]:
-    """Columns from first to last, in a row, whose a x + b y + c may be 0 or more."""
+    """Columns from first to last of a row where a x + b y + c may be 0 or more."""
     most = b * (row + (1 if b > 0.0 else 0)) + c
     if a > 0.0:
         return max(first, math.floor(min(-most / a, last + 1.0)) - 1), last

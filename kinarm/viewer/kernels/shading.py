@@ -1,4 +1,4 @@
-"""Samples to pixels: what surface is seen, and its light and what covers it."""
+"""Samples to pixels: seen surfaces, their light, and what covers them."""
 
 import math
 from typing import NamedTuple
@@ -15,7 +15,7 @@ FLOOR = 0
 """Material of the floor."""
 
 BACKGROUND, GRID = (tuple(channels(colour).tolist()) for colour in (0xEEF1F4, 0xB4BDC7))
-"""Colours, in sRGB, of the background into which all fades, and of the floor's lines."""
+"""Colours, in sRGB, of the background and of the floor's lines."""
 
 GAMMA = to_srgb(np.linspace(0, 1, 4096))
 """Encoded linear values from 0 to 1."""
@@ -91,7 +91,7 @@ def _mixed(table: Array, corners: tuple[int, int, int], share: Vector) -> Vector
 
 @inlined
 def _line_cover(across: float, slope: float, width: float) -> float:
-    """Share of a pixel that the nearest line covers; ``slope`` is a pixel's size [m]."""
+    """Share of a pixel, of a size ``slope`` [m], that the nearest line covers."""
     line = GRID_STEP * math.floor(across / GRID_STEP + 0.5)
     if abs(line) >= GRID_RADIUS:
         return 0.0
@@ -164,7 +164,7 @@ def _surface_colour(view: View, face: int, x: float, y: float) -> Vector:
 
 @inlined
 def _floor_distance(eye: Eye, x: float, y: float) -> float:
-    """Distance ahead of the floor at a place of the picture; 0 if none is seen."""
+    """Distance ahead of the floor at a place of the picture; 0 if unseen."""
     dx, dy, dz = _line_of_sight(eye, x, y)
     if dz >= 0.0 or eye.position[2] <= 0.0:
         return 0.0
