@@ -1,4 +1,4 @@
-"""kinarm: learn to reach with a simulated six-axis arm, and know how good the result is."""
+"""kinarm: learn to reach with a simulated six-axis arm, and know how good it is."""
 
 from kinarm import _interrupts as _interrupts  # first: a command answers requests to end from here
 

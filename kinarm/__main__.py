@@ -21,7 +21,7 @@ COMMANDS = {
     "bench": ("kinarm.evaluation.commands.bench", "measure how fast everything is here"),
     "reproduce": ("kinarm.evaluation.commands.reproduce", "reproduce what the paper reports"),
 }
-"""Modules of the commands, and their purposes, by name without ``kinarm-``."""
+"""Modules and purposes of the commands, by name without ``kinarm-``."""
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
@@ -36,7 +36,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
 
 
 def _explain(typed: Sequence[str]) -> None:
-    """Print help, version or completion scripts, or refuse an unknown command."""
+    """Print help, version or completion, or refuse an unknown command."""
     lines = (f"  {purpose:<42} {PROG}-{name}" for name, (_, purpose) in COMMANDS.items())
     parser = CommandParser(
         prog=PROG,

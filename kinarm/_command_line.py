@@ -22,7 +22,7 @@ METAVARS = {int: "N", float: "X", Path: "FILE"}
 
 Request = TypeVar("Request")
 Commands = Mapping[str, tuple[type, Callable[[Any], None]]]
-"""By name, a command's request, and what runs it and prints the result."""
+"""Requests of commands by name, and what runs them."""
 
 
 def add_options(
@@ -52,9 +52,9 @@ def add_options(
     skip : collection of str
         Fields without an option.
     explicit : bool
-        Whether every default is said, and what is false by default has ``--no-x``.
+        Say every default, and let what is false by default have ``--no-x``.
     names : mapping, optional
-        Names that options take, by field, if the metadata do not list them.
+        Names for options, by field, if the metadata list none.
     """
     groups: Mapping[str, Sequence[str]] = getattr(kind, "GROUPS", {})
     titles = {name: title for title, members in groups.items() for name in members}
@@ -76,7 +76,7 @@ def _add_option(
     explicit: bool,
     names: Mapping[str, Sequence[str]],
 ) -> None:
-    """Add the option of one field, or those of a nested dataclass."""
+    """Add the options of a field."""
     hint = alternatives(field_types(kind)[item.name])[0]
     if isinstance(hint, type) and is_dataclass(hint):
         for inner in init_fields(hint).values():
@@ -146,7 +146,7 @@ def _argument_type(make: Callable[[str], Any], hint: Any) -> Callable[[str], Any
 
 
 def _completes(item: Field[Any], hint: Any, known: Sequence[str]) -> Any:
-    """Completion of a value: ``"file"``, ``"folder"`` or a function of names."""
+    """Completion by ``"file"``, ``"folder"`` or a function of names."""
     if "completes" in item.metadata:
         return item.metadata["completes"]
     if known:
@@ -178,7 +178,7 @@ def _default(kind: type, item: Field[Any], *, explicit: bool) -> str:
 
 
 def _help(said: str, names: Sequence[str], default: str) -> str:
-    """Description of a field with its names and default, for argparse."""
+    """Description, names and default of a field, for argparse."""
     said = said.replace("`", "")
     if default:
         said = f"{said} (default: {default})"
@@ -188,7 +188,7 @@ def _help(said: str, names: Sequence[str], default: str) -> str:
 
 
 def given_options(options: argparse.Namespace, kind: type) -> dict[str, Any]:
-    """Fields of a dataclass on the command line; nested ones as mappings."""
+    """Given fields of a dataclass; nested ones as mappings."""
     given: dict[str, Any] = {}
     for name, value in vars(options).items():
         outer, _, inner = name.partition(".")
@@ -273,11 +273,11 @@ def run_request(
     Parameters
     ----------
     prog, kind
-        The command, and its request, a dataclass whose first line says what it does.
+        The command, and its request, a dataclass whose first line describes it.
     report : callable
-        Runs a request and prints the result; its second argument is the command as typed.
+        Runs a request, and prints; its second argument is the command as typed.
     arguments : sequence of str, optional
-        What is typed after the name; that of this process by default.
+        Typed words; this process's by default.
     skip
         Fields without an option.
     """

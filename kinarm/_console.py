@@ -39,7 +39,7 @@ def told_of_activities(listener: Callable[[str], object]) -> Iterator[None]:
 
 @contextmanager
 def doing(activity: str) -> Iterator[None]:
-    """Tell listeners of what takes long; within the same activity, nothing."""
+    """Tell listeners of what takes long, but not of the same within it."""
     if activity == _activities[-1]:
         yield
         return
@@ -92,7 +92,7 @@ def print_fitting(
     table_without : callable
         The table without the columns of given headings.
     expendable : sequence of str
-        Headings of columns that can be left out, in this order.
+        Headings to leave out, in this order.
     """
     unbounded = console.options.update(width=UNBOUNDED)
     for count in range(len(expendable) + 1):
@@ -116,7 +116,7 @@ def print_table(
     headings, rows
         Texts of the headings, and of each row.
     expendable : sequence of str
-        Headings of columns that are left out, in this order, in narrow terminals.
+        Headings to leave out, in this order, in narrow terminals.
     """
     from rich.table import Table
 
@@ -157,7 +157,7 @@ class ProgressLine:
     Parameters
     ----------
     title, unit : str
-        What is under way, and what is counted, for lines without a terminal.
+        What is under way, and what is counted.
     total : float
         What there is to do.
     console : rich.console.Console, optional

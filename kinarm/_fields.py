@@ -27,7 +27,7 @@ field_types: Callable[[type], dict[str, Any]] = cache(get_type_hints)
 SCALARS = {bool: "true or false", int: "a whole number", float: "a number", str: "a text"}
 
 OPTIONAL: Mapping[str, Any] = {"optional": True}
-"""Metadata of a field that files and hashes leave out at its default."""
+"""Metadata of fields that files and hashes omit at their default."""
 
 
 def to_plain(value: Any) -> Any:
@@ -208,7 +208,7 @@ def init_fields(kind: type) -> dict[str, Field[Any]]:
 
 @cache
 def field_docs(kind: type) -> dict[str, str]:
-    """Descriptions of fields, from Parameters of a dataclass and its bases."""
+    """Descriptions of fields in docstrings of a dataclass and its bases."""
     found: dict[str, str] = {}
     for base in reversed(kind.__mro__):
         text = re.sub(r"(?m)^    ", "", base.__dict__.get("__doc__") or "")
@@ -227,7 +227,7 @@ def summary_of(kind: type, name: str) -> str:
 
 
 def _unit(kind: type, path: str) -> str:
-    """Unit of a field in its description, in brackets; empty if none."""
+    """Unit of a field in brackets; empty if none."""
     name = path.rpartition(".")[2].partition("[")[0]
     unit = UNIT.search(summary_of(kind, name))
     return f" [{unit.group(1)}]" if unit else ""

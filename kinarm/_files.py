@@ -25,7 +25,7 @@ from numpy.typing import ArrayLike, NDArray
 from kinarm.errors import InvalidInputError, KinarmError, OutputError, UnknownNameError
 
 is_file, is_folder = os.path.isfile, os.path.isdir
-"""Whether a file or folder exists; no if none can have this name."""
+"""Whether a file or folder exists; impossible names are none."""
 
 KINDS = "biufU"
 """Kinds of arrays: truth values, whole numbers, numbers and texts."""
@@ -51,7 +51,7 @@ def write_atomically(path: str | Path, write: Callable[[IO[bytes]], object]) -> 
     Links are followed, and devices written to directly. What a killed process leaves is overwritten
     by the next one.
     """
-    target = Path(os.path.realpath(path))
+    target = absolute(path)
     beside = target.with_name(f".{target.name}.part")
     with _reported(path):
         if target.exists() and not (target.is_file() or target.is_dir()):
@@ -79,7 +79,7 @@ def write_text(path: str | Path, text: str) -> None:
 
 @contextmanager
 def only_writer(path: str | Path) -> Iterator[None]:
-    """Keep other processes from making the same file or folder meanwhile."""
+    """Keep other processes from making the same output."""
     lock = _lock_of(path)
     with _reported(path):
         try:
@@ -107,12 +107,12 @@ def is_being_written(path: str | Path) -> bool:
 
 def _lock_of(path: str | Path) -> Path:
     """File that is locked while an output is made."""
-    target = Path(os.path.realpath(path))
+    target = absolute(path)
     return target / ".lock" if target.is_dir() else target.with_name(f".{target.name}.lock")
 
 
 def _locked(path: Path, *, wait: bool = False) -> IO[bytes]:
-    """Open and lock a file that its last owner may be moving or removing."""
+    """Open and lock a file, even while it is moved or removed."""
     operation = fcntl.LOCK_EX if wait else fcntl.LOCK_EX | fcntl.LOCK_NB
     while True:
         file = os.fdopen(os.open(path, os.O_RDWR | os.O_CREAT, 0o666), "r+b")
@@ -130,7 +130,7 @@ def _locked(path: Path, *, wait: bool = False) -> IO[bytes]:
 
 @cache
 def shipped_files(folder: str, suffix: str = ".toml") -> Mapping[str, Path]:
-    """Files of a folder of kinarm's data, such as ``"scenes"``, by name."""
+    """Files of kinarm's data, such as ``"scenes"``, by name."""
     with resources.as_file(resources.files("kinarm.data") / folder) as path:
         return MappingProxyType({file.stem: file for file in sorted(path.glob(f"*{suffix}"))})
 
@@ -258,8 +258,7 @@ def load_archive(
     """
     name, wanted = repr(str(path)), f"kinarm-{kind.replace(' ', '-')}"
     with reading(name, kind, error), Path(path).open("rb") as file:
-        is_other = file.read(2) not in (b"", b"PK")
-        content = {} if is_other else _arrays(file, unless)
+        content = _arrays(file, unless) if file.read(2) in (b"", b"PK") else {}
         if "format" not in content:
             raise error(f"{name} is not a kinarm {kind}")
         given = str(content.pop("format"))
@@ -328,7 +327,7 @@ def cached_arrays(
     Parameters
     ----------
     kind, version
-        What they are, in a word; the version is raised when the same content makes other arrays.
+        A word for them; the version is raised when they change.
     made_of : bytes
         All that they depend on.
     make : callable

@@ -84,7 +84,7 @@ def telling(what_is_left: "Callable[[], str]") -> "Iterator[None]":
 
 @contextmanager
 def kept_from_children() -> "Iterator[None]":
-    """Keep what a terminal sends to all its processes from those started here."""
+    """Keep what a terminal sends from processes that start here."""
     before = signal.pthread_sigmask(signal.SIG_BLOCK, (signal.SIGINT, signal.SIGHUP))
     try:
         yield

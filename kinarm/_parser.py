@@ -63,7 +63,7 @@ class Parser(argparse.ArgumentParser):
     def parse_known_args(  # type: ignore[override]
         self, args: Sequence[str] | None = None, namespace: argparse.Namespace | None = None
     ) -> tuple[argparse.Namespace, list[str]]:
-        """Parse and refuse unknown options; parsers of commands know their own."""
+        """Parse, and refuse unknown options."""
         parsed, unknown = super().parse_known_args(args, namespace)
         if unknown:
             given = (word.partition("=")[0] for word in unknown if word.startswith("--"))
@@ -74,7 +74,7 @@ class Parser(argparse.ArgumentParser):
         return parsed, unknown
 
     def add_commands(self, what: str) -> "argparse._SubParsersAction[CommandParser]":
-        """Let the first word be a command, called ``what``, with its own options."""
+        """Let the first word be a command, called ``what``, with options."""
         title, metavar = f"{what}s", what.upper()
         return self.add_subparsers(
             title=title, dest=what, required=True, metavar=metavar, parser_class=CommandParser
@@ -86,8 +86,7 @@ class Parser(argparse.ArgumentParser):
 
     def format_help(self) -> str:
         """Usage, purpose, then groups of options, the general one last."""
-        general = self._optionals
-        self._action_groups.sort(key=lambda group: group is general)
+        self._action_groups.sort(key=lambda group: group is self._optionals)
         end = Path(import_module("kinarm.data").__path__[0], "help", f"{self.prog}.txt")
         if end.is_file():
             self.epilog = end.read_text()
@@ -95,7 +94,7 @@ class Parser(argparse.ArgumentParser):
 
 
 class CommandParser(Parser):
-    """The parser of a program's command; completion is left to the program."""
+    """The parser of a program's command, without completion."""
 
     completable = False
 
@@ -152,7 +151,7 @@ class _PrintCompletion(argparse.Action):
 
 
 def completion_script(parser: argparse.ArgumentParser, shell: str) -> str:
-    """Script by which a shell completes the options that `add_options` added."""
+    """Script of a shell for options that `add_options` added."""
     import shtab
 
     for action in _actions(parser):

@@ -31,11 +31,11 @@ class Arm:
     Attributes
     ----------
     specification, description : ArmSpecification and Description
-        What it was made of, and the URDF, reduced to the chain that carries the tool.
+        What it was made of, and the URDF, reduced to the tool's chain.
     model, geometry : pinocchio.Model and pinocchio.GeometryModel
         Kinematics, and collision shapes without pairs: primitives, or convex hulls of meshes.
     n_actuated : int
-        Joints that actions move: the first ``n_actuated`` ones; the others stay at `home`.
+        Joints, the first ones, that actions move; the others stay at `home`.
     home : ndarray, shape (n_joints,)
         Reference configuration [rad or m].
     allowed_contacts : tuple of AllowedContact
@@ -228,7 +228,7 @@ def _build_model(description: Description, speeds: tuple[float, ...] | None) -> 
 
 
 def _robot(description: Description) -> ElementTree.Element:
-    """Pinocchio's input: links with their collision shapes, and joints."""
+    """Pinocchio's input: links, collision shapes and joints."""
     robot = ElementTree.fromstring(description.text)
     robot.attrib = {"name": "robot", "version": "1.2"}
     for parent in (robot, *robot):

@@ -91,7 +91,7 @@ class ArmSpecification(Checked):
         return replace(self, source=source, package_dirs=folders)
 
     def completed(self) -> "ArmSpecification":
-        """The same arm completed by its arm files, with a URDF as source."""
+        """The same arm, completed by its files down to a URDF."""
         file = ArmFile.of(self.source)
         if file is None:
             return self

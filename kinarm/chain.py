@@ -1,4 +1,4 @@
-"""A serial chain as flat arrays for kernels; its frames, and motion bounds."""
+"""A serial chain as flat arrays; its frames, and motion bounds."""
 
 from typing import NamedTuple
 

@@ -161,13 +161,13 @@ class ContactStatistics:
 
     @property
     def shares(self) -> dict[tuple[str, str], float]:
-        """Share of the configurations at which each pair touches, largest first."""
+        """Share of configurations at which pairs touch, largest first."""
         shares = self.touching.mean(axis=0)
         order = np.argsort(-shares, kind="stable")
         return {self.pairs[index]: float(shares[index]) for index in order}
 
     def check_movable(self, arm: str) -> None:
-        """Refuse a world that is always in contact, by the pair that touches most."""
+        """Refuse a world that is always in contact."""
         if not self.free.any():
             (pair, share), *_ = self.shares.items()
             raise ProblemError(

@@ -31,7 +31,7 @@ FEW = 4
 """Of up to so many steps in doubt, Coal tells what touches."""
 
 MOUNT_SAMPLES = 721
-"""Positions of the first joint at which the mounting is tested."""
+"""Positions of the first joint that test the mounting."""
 
 
 class Contact(NamedTuple):
@@ -69,7 +69,7 @@ class ContactModel:
     shapes : ContactShapes
         The same pairs for the kernels.
     left_out : dict
-        Why pairs that move against each other are left out, by the names of their bodies.
+        Reasons why moving pairs are left out, by the names of bodies.
     """
 
     arm: Arm
@@ -123,7 +123,7 @@ class ContactModel:
 
     @cached_property
     def workspace(self) -> tuple[pin.Data, pin.GeometryData, list[coal.CollisionResult]]:
-        """Data of Pinocchio and Coal, and where the results of each pair lie."""
+        """Data of Pinocchio and Coal, and results of each pair."""
         data = make_verdicts_reliable(self.geometry.createData())
         # A list, since wrapping results takes longer than the test itself.
         return self.arm.model.createData(), data, list(data.collisionResults)
@@ -150,7 +150,7 @@ class ContactModel:
         return None if index is None else self.pair_names[index]
 
     def contact(self, configuration: NDArray[np.float64]) -> Contact | None:
-        """Describe the first tested pair that is in contact, or return None."""
+        """Describe the first pair in contact, or return None."""
         index = self.first_in_contact(configuration)
         if index is None:
             return None
@@ -186,7 +186,7 @@ class ContactModel:
         Returns
         -------
         touched : ndarray of int, shape (n,)
-            Numbers of the pairs, from 1; -1 where only contact is known, 0 where there is none.
+            Numbers of pairs, from 1; -1 for unknown ones, 0 without contact.
         asked : int
             Configurations that Coal was asked about.
         """
@@ -241,7 +241,7 @@ def _add_scene(geometry: pin.GeometryModel, scene: Scene) -> None:
 
 
 def _links(arm: Arm) -> list[str]:
-    """Link of each collision shape, whose name ends in its number on it."""
+    """Link of each collision shape."""
     return [shape.name.rsplit("_", 1)[0] for shape in arm.geometry.geometryObjects]
 
 
@@ -282,7 +282,7 @@ def _uninformative_pairs(
     pairs, objects = list(geometry.collisionPairs), geometry.geometryObjects
 
     def touching(q: NDArray[np.float64], chosen: Iterable[int]) -> set[int]:
-        """Indices of those chosen pairs that are in contact at a configuration."""
+        """Indices of chosen pairs in contact at a configuration."""
         pin.updateGeometryPlacements(arm.model, data, geometry, geometry_data, q)
         start_anew(geometry_data.collisionRequests[index] for index in chosen)
         return {index for index in chosen if pin.computeCollision(geometry, geometry_data, index)}

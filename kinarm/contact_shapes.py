@@ -93,7 +93,7 @@ def _prism(radius: float, half_length: float) -> Array:
 
 
 def _around(points: Array, most: int) -> Enclosure:
-    """Enclose the hull of points, shape (n, 3), or look that up in the cache."""
+    """Enclose the hull of points, shape (n, 3), through the cache."""
     made_of = np.int64(most).tobytes() + points.tobytes()
     fitted = cached_arrays("enclosure", ENCLOSURES, made_of, lambda: _fitted(points, most))
     return Enclosure(fitted["corners"], float(fitted["rounding"]))
@@ -122,7 +122,7 @@ def enclosing_capsule(shape: pin.GeometryObject) -> Enclosure:
 
 
 def _capsule_around(points: Array) -> Enclosure:
-    """Capsule along the longest principal direction of points, shape (n, 3)."""
+    """Capsule along the main direction of points, shape (n, 3)."""
     centre = (points.min(axis=0) + points.max(axis=0)) / 2
     _, _, directions = np.linalg.svd(points - centre, full_matrices=False)
     direction = directions[0]
@@ -208,7 +208,7 @@ class ContactShapes(NamedTuple):
         n_shapes : int
             The arm's shapes.
         close : collection of int
-            Pairs that mostly are too close to each other for coarse polytopes.
+            Pairs that mostly are too close for coarse polytopes.
         """
         objects = list(arm.geometry.geometryObjects)
         bodies, links, finer = _enclosed(objects, scene)
@@ -287,7 +287,7 @@ def _turned(points: Array, rotation: Array, about: Array | float = 0.0) -> Array
 
 
 def _keeps_height(chain: Chain) -> bool:
-    """Whether the first joint is a vertical revolute one, which keeps heights."""
+    """Whether the first joint turns about the vertical, keeping heights."""
     if chain.prismatic[0]:
         return False
     w, x, y, z = chain.rotation[0]

@@ -40,7 +40,7 @@ LARGEST = 1e6
 
 
 def one_line(text: str) -> str:
-    """A message as one line, cut in the middle if it is very long."""
+    """A message as one line, cut in the middle if very long."""
     line = " ".join(text.split())
     if len(line) <= LONGEST:
         return line
@@ -228,8 +228,7 @@ def check_range(name: str, value: Any, demands: Mapping[str, Any]) -> None:
     name : str
         Name of the field, for messages.
     value : object
-        Its value, in its unit; entries of tuples are checked one by one, and anything but numbers
-        passes.
+        Its value, or a tuple of such; anything but numbers passes.
     demands : mapping
         Metadata of the field. For whole numbers: ``at_least``, 1 by default, and ``at_most``. For
         others: a condition that ``holds``, and what they ``must`` in words.

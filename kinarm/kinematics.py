@@ -27,7 +27,7 @@ ISOLATED_SEPARATION, CONTINUUM_SEPARATION = 1e-3, 0.2
 """Least difference in some joint of isolated and of other solutions [rad or m]."""
 
 SEEDS, LEAST_SEEDS = 1024, 128
-"""Seeds: at most, and before a search for isolated solutions may end."""
+"""Seeds: at most, and at least for isolated solutions."""
 
 LOT = 1024
 """Targets solved together."""
@@ -79,7 +79,7 @@ class Kinematics(ABC):
 
     @cached_property
     def frames(self) -> dict[str, Frame]:
-        """Frames that `poses` and `jacobians` know, by names of joints and links."""
+        """Frames of joints and links by name."""
         return find_frames(self.arm.model)
 
     @cached_property
@@ -174,7 +174,7 @@ class Kinematics(ABC):
         turns : bool
             Return solutions that differ by whole turns one by one.
         most : int
-            Largest number of solutions of a target, before contact and turns are considered.
+            Largest number of solutions of a target, before contact and turns.
         separation : float, optional
             Least difference of two solutions in some joint; by default 0.001 if they are isolated,
             else 0.2 [rad or m].
@@ -213,7 +213,7 @@ class Kinematics(ABC):
     def _search(
         self, axes: Array, near: Array, joints: int | None, separation: float | None
     ) -> Search:
-        """Check and complete a search; see `Kinematics.inverse_kinematics`."""
+        """Check and complete a search."""
         moved = _moved(self.arm, axes) if joints is None else joints
         moved = whole_number("joints", moved, 1, self.arm.n_joints)
         isolated = moved <= {0: 3, 1: 5, 3: 6}[len(axes)]

@@ -35,7 +35,7 @@ VERSION = 1
 """To be raised when the same mesh gets another hull."""
 
 MANY_VERTICES = 1000
-"""Vertices above which a hull becomes a simpler one around it."""
+"""Vertices above which a simpler hull takes its place."""
 
 PLANES = 160
 """Faces of such a hull at most; vertices are twice as many less four."""
@@ -44,7 +44,7 @@ EXCESS = 1e-4
 """Depth of a corner up to which it is not cut off [m]."""
 
 GRID = 1e-9
-"""Normals and offsets are multiples of it [1 and m], so that machines agree."""
+"""Unit of normals and offsets [1 and m], so that machines agree."""
 
 
 def resolve_meshes(robot: ElementTree.Element, path: Path, folders: Collection[str]) -> None:
@@ -75,7 +75,7 @@ def resolve_meshes(robot: ElementTree.Element, path: Path, folders: Collection[s
 
 
 def _mesh_path(name: str, path: Path, folders: Collection[str]) -> Path | None:
-    """Find a mesh in the package folders, or in those around the URDF."""
+    """Find a mesh in package folders, or around the URDF."""
     scheme, separator, inside = name.partition("://")
     if scheme == "file":
         return Path(inside) if is_file(inside) else None

@@ -22,7 +22,7 @@ class CompiledPolicy(Protocol):
     """A policy that can run inside the compiled simulator."""
 
     def networks(self) -> Networks:
-        """The policy as a batch of one network, its normaliser included."""
+        """The policy and its normaliser as a batch of one network."""
 
 
 ACTIVATIONS: dict[str, Callable[[Array], Array]] = {
@@ -53,7 +53,7 @@ class Layer(NamedTuple):
 
 
 class Mirror(NamedTuple):
-    """Signs that the reflection y -> -y gives to observations and actions."""
+    """Signs of observations and actions in the reflection y -> -y."""
 
     observations: Array
     actions: Array
@@ -168,7 +168,7 @@ def network_control(
     policy_index : array_like of int, shape (n,), or None
         Policy of each episode.
     n, widths
-        Number of episodes, and lengths of an observation and of an action.
+        Number of episodes, and lengths of observation and action.
     """
     networks = Networks.collect(policies)
     given = (int(networks.layers[0]), int(networks.layers[-1]))

@@ -36,7 +36,7 @@ class Part(NamedTuple):
     name, meaning, unit : str
         Its name in layouts, and its meaning for people.
     signs : tuple of int
-        Signs that the reflection y -> -y gives its entries.
+        Signs of its entries in the reflection y -> -y.
     bounds : callable
         From `Ranges` to lowest and highest values of its entries.
     write : callable
@@ -59,7 +59,7 @@ class Part(NamedTuple):
         return len(self.signs) * (n_joints if self.per_joint else 1)
 
     def repeated(self, values: ArrayLike, n_joints: int) -> Array:
-        """Values of its entries, or one for all, repeated for every joint."""
+        """Values of its entries, or one for all, for every joint."""
         once = np.broadcast_to(np.asarray(values, dtype=np.float64), len(self.signs))
         return np.tile(once, self.length(n_joints) // len(self.signs))
 
@@ -114,7 +114,7 @@ def _write_position(
 
 
 POLAR = (1, -1, 1)
-"""Signs that the reflection y -> -y gives a vector's entries."""
+"""Signs of a vector in the reflection y -> -y."""
 
 OBSERVATION = (
     Part(
@@ -167,13 +167,13 @@ def observation_size(n_joints: int) -> int:
 
 
 def observation_layout() -> str:
-    """Names and lengths of the parts, to tell if a policy understands them."""
+    """Names and lengths of the parts, to compare."""
     parts = (f"{part.name} {len(part.signs)}{'n' * part.per_joint}" for part in OBSERVATION)
     return f"{VERSION}: {', '.join(parts)}"
 
 
 def observation_signs(n_joints: int) -> Array:
-    """Signs that the reflection y -> -y gives entries, shape (n_observations,)."""
+    """Signs of entries in the reflection y -> -y, shape (n_observations,)."""
     return np.concatenate([part.repeated(part.signs, n_joints) for part in OBSERVATION])
 
 

@@ -155,7 +155,7 @@ class ReachProblem(Checked):
 
     @cached_property
     def digest(self) -> str:
-        """Hash of everything that behaviour depends on, which the name is not."""
+        """Hash of all that behaviour depends on, without the name."""
         entries = {**self.to_json(), "arm": self.arm_digest}
         del entries["name"]
         text = json.dumps(entries, sort_keys=True)
@@ -195,7 +195,7 @@ class ReachProblem(Checked):
             raise ProblemError(f"{what} is of another problem: {difference}")
 
     def to_json(self) -> dict[str, Any]:
-        """As a dictionary for JSON; `from_json` reads it without loss."""
+        """As a dictionary for JSON, without loss."""
         entries: dict[str, Any] = to_plain(self)
         return entries
 
@@ -205,7 +205,7 @@ class ReachProblem(Checked):
         return from_plain(cls, entries, where)
 
     def to_toml(self) -> str:
-        """As text of a problem file; `load` reads it without loss."""
+        """As text of a problem file, without loss."""
         return tomli_w.dumps(self.to_json())
 
     def save(self, path: str | Path) -> None:

@@ -57,7 +57,7 @@ class ProblemOptions(Checked):
             *("tolerance", "horizon", "start_spread"),
         )
     }
-    """Fields by the title of the group of options that they are in."""
+    """Fields by the titles of groups."""
 
     DEFAULTS: ClassVar[Mapping[str, str]] = {
         **dict.fromkeys(
@@ -79,7 +79,7 @@ class ProblemOptions(Checked):
         return problem.replace(arm=self._arm(problem), **changed)
 
     def _arm(self, problem: ReachProblem) -> "Arm | None":
-        """The arm that the options name or change; None without such options."""
+        """The arm that the options name or change, or None."""
         from kinarm.arm import Arm  # loads Pinocchio, unlike --help
 
         given = {"tool_frame": self.tool_frame, "package_dirs": self.package_dirs or None}
@@ -90,7 +90,7 @@ class ProblemOptions(Checked):
 
 
 def say_choices(problems: Iterable[ReachProblem]) -> None:
-    """Print choices where a URDF says nothing on standard error, a line per arm."""
+    """Say on standard error what was chosen for URDFs, a line per arm."""
     for specification in dict.fromkeys(problem.arm for problem in problems):
         if specification.source not in arm_names():
             from kinarm.arm import Arm

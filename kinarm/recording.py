@@ -35,7 +35,7 @@ class Recording:
     Parameters
     ----------
     policy, problem
-        Name of what drove the arm, and the problem, with the hash of its arm.
+        Name of what drove the arm, and the problem, with its arm's hash.
     trial : int
         Number of the trial in its set.
     states : ndarray, shape (steps + 1, n_joints)
@@ -245,9 +245,9 @@ def record_path(
     Parameters
     ----------
     problem : World, ReachProblem, str or Path
-        Arm, scene and time step; a horizon too short for the path is extended.
+        Arm, scene and time step; a short horizon is extended.
     path : array_like, shape (n, n_joints)
-        At least one configuration, all within the limits [rad or m].
+        One or more configurations within the limits [rad or m].
     goal : array_like, shape (3,), optional
         Goal position; the tool point at the path's end by default [m].
     name : str

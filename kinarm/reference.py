@@ -42,7 +42,7 @@ class ReferenceEpisode(NamedTuple):
 
 
 class ReferenceSimulator:
-    """Steps single episodes with Pinocchio's kinematics and Coal's verdict."""
+    """Steps single episodes with Pinocchio and Coal."""
 
     def __init__(self, simulator: Simulator) -> None:
         self.arm: Arm = simulator.arm

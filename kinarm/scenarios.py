@@ -101,7 +101,7 @@ class ScenarioQueues:
     """Starts and goals of the episodes of many arms, drawn together.
 
     An arm's are those of `draw_scenarios` with its generator, a few at a time. There is room for
-    two draws: once an arm has none, all with room get one.
+    two draws: once an arm has no scenario left, all with room get more.
     """
 
     def __init__(self, world: World, n_arms: int) -> None:

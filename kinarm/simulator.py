@@ -43,14 +43,14 @@ class Simulator:
     problem : ReachProblem, str or Path
         The problem, its name or file.
     threads : int, optional
-        Threads for large batches; by default as many as processors that this process may use.
+        Threads for large batches; as many as available processors by default.
 
     Attributes
     ----------
     world : World
         Arm and scene, and questions about configurations.
     checked_by_coal : int
-        Configurations that Coal was asked about in rollouts and steps so far.
+        Configurations that Coal was asked about so far.
     """
 
     def __init__(self, problem: ProblemLike, *, threads: int | None = None) -> None:
@@ -270,7 +270,7 @@ class Simulator:
         episodes.status[paused] = RUNNING
 
     def _stepped(self, episodes: Episodes) -> Session:
-        """Session by which episodes are stepped, kept until other episodes come."""
+        """Session of stepped episodes, kept until others come."""
         if self._last is None or self._last.episodes is not episodes:
             control = Control(actions=np.zeros((len(episodes.status), 1, self.n_actions)))
             self._last = self.world.session(control, episodes)

@@ -1,4 +1,4 @@
-"""Robot descriptions as in their files: checked trees of links and joints."""
+"""Robot descriptions in files: checked trees of links and joints."""
 
 import math
 from collections import Counter
@@ -107,7 +107,7 @@ def _check_joint(joint: Element, where: str) -> None:
 
 
 def _check_shape(collision: Element, where: str) -> None:
-    """Check a collision element's numbers, and drop all shapes but the first."""
+    """Check a collision element's numbers, and drop further shapes."""
     geometry = collision.find("geometry")
     if geometry is None or not len(geometry) or geometry[0].tag not in SHAPES:
         raise ArmError(f"{where} needs a shape of {', '.join(SHAPES)} in each collision element")

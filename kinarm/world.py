@@ -34,7 +34,7 @@ class World(Kinematics):
     problem : ReachProblem, str or Path
         The problem, its name or file.
     threads : int, optional
-        Threads for large batches; by default as many as processors that this process may use.
+        Threads for large batches; as many as available processors by default.
 
     Attributes
     ----------
@@ -67,7 +67,7 @@ class World(Kinematics):
         self._shares = np.arange(1, n_tested + 1)[:, None] / n_tested
 
     def _check_starts(self) -> None:
-        """Refuse configurations of the task that nothing can start at."""
+        """Refuse impossible starts of the task."""
         for number, start in enumerate(self.problem.task.starts):
             name = f"task.starts[{number}]"
             q = finite_array(name, start, (self.arm.n_joints,))
@@ -121,7 +121,7 @@ class World(Kinematics):
         return self._begun_at(configurations, goals).observation
 
     def distances(self, configurations: ArrayLike, goals: ArrayLike) -> Array:
-        """Distances from the tool to goals, shape (n,) [m], for `observe`'s arguments."""
+        """Distances of the tool from goals, shape (n,) [m]; see `observe`."""
         return self._begun_at(configurations, goals).distance
 
     def screen(self, configurations: ArrayLike) -> tuple[Array, NDArray[np.bool_]]:

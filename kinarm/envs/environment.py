@@ -91,7 +91,7 @@ class Interface:
         return observations.astype(self._dtype)
 
     def step_outcome(self, episodes: Episodes, result: StepResult) -> Outcome:  # noqa: ARG002
-        """Reward a step, and tell which episodes are over; may let some go on."""
+        """Reward a step, and tell or change which episodes are over."""
         return result.reward, result.terminated, result.truncated
 
 
@@ -165,7 +165,7 @@ class ArmEnvironment(Lifecycle):
         render_mode: str | None,
         **picture: Any,
     ) -> None:
-        """Build a simulator and its interface; settings are those of `ReachEnv`."""
+        """Build simulator and interface by the settings of `ReachEnv`."""
         try:
             changed = ReachProblem.load(problem).replace(**overrides)
             self.simulator = simulator = Simulator(changed, threads=threads)

@@ -205,7 +205,7 @@ class ReachGoalVectorEnv(GoalEnvironment, ReachVectorEnv):
 
 
 def _collided(info: Any) -> NDArray[np.bool_]:
-    """Whether a step's, a batch's or a sequence of infos tell of collisions."""
+    """Whether infos, of a step, a batch or a sequence, tell of collisions."""
     if isinstance(info, Mapping):
         return np.asarray(info.get("collision", False))
     return np.array([each.get("collision", False) for each in info], dtype=bool)

@@ -131,7 +131,7 @@ class ReachEnv(ArmEnvironment, gymnasium.Env[Any, Array]):
         self._pictures.close()
 
     def _rest(self, episode: Episodes, result: StepResult) -> None:
-        """Let a step after the end, in which nothing moved, tell of the end again."""
+        """Let a step after the end tell of the end again."""
         gymnasium.logger.warn(
             "step() was called although the episode is over: call reset() first. "
             "Nothing moves until then, and rewards are 0."

@@ -29,11 +29,11 @@ FULL_SIZE = 4
 
 
 class Pictures(tuple[Picture, ...]):
-    """Pictures of all arms, of one size, as Gymnasium expects of a batch."""
+    """Pictures of all arms, of one size, as in Gymnasium."""
 
     @property
     def tiled(self) -> Picture:
-        """All in one picture, row by row from the upper left; the rest is white."""
+        """All in one picture, row by row; empty tiles are white."""
         height, width = self[0].shape[:2]
         columns = math.ceil(math.sqrt(len(self)))
         rows = math.ceil(len(self) / columns)

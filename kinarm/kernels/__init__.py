@@ -20,7 +20,7 @@ import numba
 from kinarm.errors import KinarmError
 
 TESTED = (0, 62), (0, 68)
-"""First and last version of Numba that the kernels are known to work with."""
+"""First and last version of Numba that is known to work."""
 
 if not TESTED[0] <= numba.version_info.short <= TESTED[1]:
     raise KinarmError(

@@ -62,7 +62,7 @@ def inlined(function: Function) -> Function:
 
 
 def helper(function: Function) -> Function:
-    """Compile a long helper that allocates nothing, once, to be called."""
+    """Compile a long helper that allocates nothing, to be called."""
     return _linked(function, _nrt=False)
 
 
@@ -103,7 +103,7 @@ expressions of whole arrays. They take a twelfth of the time."""
 
 
 class LeanLibrary(JITCodeLibrary):
-    """Code of a kernel in lanes, optimised once, where Numba prunes reference counts in between.
+    """Code of a kernel in lanes, optimised once: it has no reference counts to prune.
 
     LLVM makes no vectors of loops: lanes are vectors.
     """
@@ -126,7 +126,7 @@ class LinkedLibrary(JITCodeLibrary):
         return self
 
     def set_env(self, name: str, environment: object) -> None:
-        """Ignore the environment: it holds Python objects, which helpers lack."""
+        """Ignore the environment: helpers have no Python objects."""
 
     def finalize(self) -> None:
         """Link in called functions; kernels optimise and make machine code."""
@@ -142,7 +142,7 @@ class LinkedLibrary(JITCodeLibrary):
 
 
 class KernelCompiler(CompilerBase):
-    """Numba's compiler without garbage collection, since it keeps nearly all."""
+    """Numba's compiler, which keeps nearly all, without garbage collection."""
 
     library: type[JITCodeLibrary] | None = None
     """Instead of Numba's own."""

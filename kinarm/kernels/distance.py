@@ -14,7 +14,7 @@ from kinarm.kernels.lanes import any_lane, select
 
 @inlined
 def between_segments(a: Vector, b: Vector, c: Vector, d: Vector) -> Vector:
-    """Vector from segment cd to segment ab, between (nearly) closest points."""
+    """Vector from segment cd to ab, between (nearly) closest points."""
     ux, uy, uz = b[0] - a[0], b[1] - a[1], b[2] - a[2]
     vx, vy, vz = d[0] - c[0], d[1] - c[1], d[2] - c[2]
     rx, ry, rz = a[0] - c[0], a[1] - c[1], a[2] - c[2]

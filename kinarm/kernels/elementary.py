@@ -7,7 +7,7 @@ from kinarm.kernels.compiling import inlined
 from kinarm.kernels.lanes import power_of_two, select
 
 HALF_PI = 1.57079632673412561417
-"""Half of pi in 33 bits: its products with small whole numbers are exact."""
+"""Half of pi in 33 bits: small multiples are exact."""
 HALF_PI_REST = 6.07710050650619224932e-11
 """Half of pi less `HALF_PI`."""
 QUARTERS = 0.63661977236758134308

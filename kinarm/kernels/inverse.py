@@ -23,7 +23,7 @@ ITERATIONS = 48
 """Steps of a seed at most."""
 
 PATIENCE, PROGRESS = 20, 0.98
-"""Steps after which a seed ends whose squared error shrinks too little, and share."""
+"""Steps before a seed ends that no longer shrinks its squared error to this share."""
 
 DAMPING, LEAST_DAMPING = 0.1, 1e-12
 """Added to the diagonal of J J^T: share of the squared error, and at least this."""
@@ -221,13 +221,12 @@ def solve_targets(
         turns = not prismatic[k] and (search.least > 0 or upper[k] - lower[k] >= TURN)
         lowest[k], highest[k] = (-math.inf, math.inf) if turns else (lower[k], upper[k])
     hits = np.zeros(most + 1, dtype=np.int64)
-    everything = (1 << LANES) - 1
     for target in range(first, last):
         for k in range(3):
             aim[k] = positions[target, k]
             for i in range(n_axes):
                 wanted[i, k] = directions[target, i, k]
-        found, tried, waiting, n_moving, free = 0, 0, 0, 0, everything
+        found, tried, waiting, n_moving, free = 0, 0, 0, 0, (1 << LANES) - 1
         while True:
             # Put the next seeds into free lanes: first ``near``, then the others.
             for lane in range(LANES):
@@ -295,7 +294,7 @@ LONGEST_STEP = 0.5
 
 @inlined
 def take_out_blocked(q: Array, lower: Array, upper: Array, step: Array, jacobian: Array) -> bool:
-    """Zero the Jacobian's columns of joints that would leave limits; tell if there are any."""
+    """Zero the Jacobian's columns of joints that would leave limits; tell if any."""
     blocked = False
     for k in range(step.shape[0]):
         outward = ((q[0, k] >= upper[k]) & (step[k] > 0.0)) | (

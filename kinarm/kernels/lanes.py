@@ -62,7 +62,7 @@ lanes, mask = LanesType(), MaskType()
 @register_model(LanesType)
 @register_model(MaskType)
 class _VectorModel(models.PrimitiveModel):
-    def __init__(self, manager: Any, kind: types.Type) -> None:
+    def __init__(self, manager: Any, kind: Any) -> None:
         super().__init__(manager, kind, kind.vector)
 
 
@@ -121,7 +121,7 @@ def _compare(symbol: str) -> Callable[..., Any]:
 
 
 def _choose(symbol: str) -> Callable[..., Any]:
-    """The first argument where the comparison holds, else the second."""
+    """The first argument where a comparison holds, else the second."""
     return lambda builder, x, y: builder.select(builder.fcmp_ordered(symbol, x, y), x, y)
 
 

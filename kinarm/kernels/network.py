@@ -100,7 +100,7 @@ def act(
 
 @inlined
 def shared_policy(n_episodes: int, control: Control) -> int:
-    """The policy of all episodes; -1 if there are several, 0 with a table."""
+    """Policy of all episodes; -1 if there are several, 0 with a table."""
     if control.layers.shape[0] == 0 or n_episodes == 0:
         return 0
     for e in range(1, n_episodes):

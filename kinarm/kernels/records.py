@@ -180,14 +180,13 @@ def _array_type(entry: types.Type, ndim: int) -> types.Array:
 @cache
 def _record_type(named: Any, *kinds: Any) -> RecordType:
     """Type of a named tuple's record, with arrays given by types and axes."""
-    fields = zip(named._fields, kinds, strict=True)
     return RecordType(
         named.__name__,
         tuple(
             (name, _array_type(from_dtype(np.dtype(kind[0])), kind[1]))
             if isinstance(kind, tuple)
             else (name, kind)
-            for name, kind in fields
+            for name, kind in zip(named._fields, kinds, strict=True)
         ),
     )
 

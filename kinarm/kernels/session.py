@@ -104,7 +104,7 @@ def layouts(
 
 @inlined
 def put(rows: Array, e: int, held: Array, row: int, lane: int) -> None:
-    """Copy a row of an array into a lane of a row of an array of lanes."""
+    """Copy a row into a lane of a row of lanes."""
     numbers = as_numbers(held)
     for i in range(numbers.shape[1]):
         numbers[row, i, lane] = rows[e, i]
@@ -112,7 +112,7 @@ def put(rows: Array, e: int, held: Array, row: int, lane: int) -> None:
 
 @inlined
 def take(held: Array, row: int, lane: int, rows: Array, e: int) -> None:
-    """Copy a lane of a row of an array of lanes into a row of an array."""
+    """Copy a lane of a row of lanes into a row."""
     numbers = as_numbers(held)
     for i in range(numbers.shape[1]):
         rows[e, i] = numbers[row, i, lane]
@@ -120,7 +120,7 @@ def take(held: Array, row: int, lane: int, rows: Array, e: int) -> None:
 
 @inlined
 def take_rows(held: Array, lane: int, rows: Array) -> None:
-    """Copy a lane of an array of lanes into as many rows as an array has."""
+    """Copy a lane of rows of lanes into all rows of an array."""
     for row in range(rows.shape[0]):
         take(held, row, lane, rows, row)
 
@@ -207,7 +207,7 @@ class Session(Record):
         self._others: list[Session] = []
 
     def of_thread(self, number: int) -> "Session":
-        """The session of a thread, counted from 0: this one, or another."""
+        """The session of a thread; this one is that of thread 0."""
         while len(self._others) < number:
             self._others.append(Session(*self.values[:5]))
         return self._others[number - 1] if number else self

@@ -48,7 +48,7 @@ CLUTTER = ("/Axes", "/Grid", "/Lights/PointLightPositiveX", "/Lights/PointLightN
 """Meshcat's default objects that replays do not show."""
 DIMMED = {"/Lights/AmbientLight/<object>": 0.42, "/Lights/FillLight/<object>": 0.2}
 FIELD_OF_VIEW, CAMERA_PLACE = 32, (-2.4, 1.6, 1.9)
-"""Of the live page [degrees, m], in three.js' frame, whose y axis points up."""
+"""Of the live page [degrees, m]; in three.js, y points up."""
 
 
 class DrawnScene:
@@ -252,7 +252,7 @@ def aim_camera(window: Visualizer, scale: float = 1.0) -> None:
 
 
 def draw_goal(window: Visualizer, problem: ReachProblem) -> None:
-    """The cube, and the halo of goals within tolerance, about the origin."""
+    """The cube, and the halo of its tolerance, about the origin."""
     put(window["cube"], CUBE, cube_mesh(problem.scene))
     put(window["halo"], HALO, capsule(0.0, problem.task.tolerance))
 
@@ -282,7 +282,7 @@ def draw_trace(
     points : ndarray, shape (n, 3)
         Positions of the tool [m].
     outcome : str, optional
-        How the episode ended, if it has; determines the colour.
+        How the episode ended, if it has.
     scale : float
         Size of the stage; see `stage_scale`.
     """

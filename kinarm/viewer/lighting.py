@@ -310,7 +310,7 @@ def _node_directions(nodes: int) -> Array:
 
 
 def _room_radiance(directions: Array) -> Array:
-    """Colours of the boxes' sides that are seen from the origin, shape (n, 3)."""
+    """Colours of the boxes seen from the origin, shape (n, 3)."""
     nearest = np.full(len(directions), np.inf)
     colours = np.zeros((len(directions), 3))
     with np.errstate(divide="ignore"):

@@ -36,7 +36,7 @@ FILES = {
     "/meshcat.js": ("text/javascript; charset=utf-8", "meshcat", "viewer/dist/main.min.js"),
     "/scene": ("application/octet-stream", "", ""),
 }
-"""Type, package and name of a page's files, by address; the scene is none."""
+"""Type, package and name of files, by address; the scene is none."""
 
 
 class LiveServer(ThreadingTCPServer):
@@ -47,7 +47,7 @@ class LiveServer(ThreadingTCPServer):
     Parameters
     ----------
     port : int
-        Port to listen on; the next free one if it is taken. The attribute is that used.
+        Port, or the next free one, which the attribute tells.
 
     Attributes
     ----------

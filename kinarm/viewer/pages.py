@@ -43,7 +43,7 @@ NOTEBOOK_FRAME = Markup(
 )
 
 NEARER = 0.8
-"""Distance of the camera from an arm alone, as a share of that in replays."""
+"""Camera's distance from an arm alone, as a share of that in replays."""
 
 BARE_GROUND = Scene(obstacles=(), goal_regions=())
 
@@ -55,7 +55,7 @@ class HtmlPage:
     html: str
 
     def save(self, path: str | Path) -> None:
-        """Write the page to a file; a failure leaves an existing one as it was."""
+        """Write the page to a file, or leave an existing one as it was."""
         write_text(path, self.html)
 
     def __repr__(self) -> str:
@@ -156,8 +156,7 @@ def replay_page(
     ghosts : sequence of Recording
         Recordings of another policy in the same trials, shown in the same scene.
     groups : sequence of str
-        Group of each recording, for a list of the trials; a group's recordings follow each other.
-        By default there is no list.
+        Group of each recording in a list of trials; groups stay together. By default no list.
     heading : str
         Heading of the list.
 
@@ -298,7 +297,7 @@ def arm_page(
     Parameters
     ----------
     arm : Arm, ArmSpecification, str or Path
-        The arm, where it stands, or what `kinarm.Arm.load` takes, mounted as the scene says.
+        The arm where it stands, or for `kinarm.Arm.load`, mounted as in the scene.
     path : str or Path, optional
         File of the page, if it is to be written.
     scene : Scene
@@ -313,7 +312,7 @@ def arm_page(
 
 
 def _arm_html(arm: Arm, scene: Scene) -> str:
-    """Page of an arm in a scene, with the shapes and pairs tested for contact."""
+    """Page of an arm in a scene, with shapes and tested pairs."""
     model = ContactModel.build(arm, scene)
     drawn = DrawnScene()
     frames = draw_stage(drawn.window, arm, scene)

@@ -67,7 +67,7 @@ TRACES: dict[str | None, Finish] = {
     None: Finish(0x4D5A68, roughness=0.5),
     **{outcome: Finish(colour, roughness=0.5) for outcome, colour in OUTCOME_COLOURS.items()},
 }
-"""Finish of the tool's way, by outcome; None while the episode goes on."""
+"""Finish of the tool's way by outcome; None before the end."""
 
 
 def shape_finish(colour: int) -> Finish:
@@ -102,7 +102,7 @@ def to_srgb(linear: ArrayLike) -> Array:
 
 
 def obstacle_meshes(obstacle: Obstacle, scene: Scene) -> list[Mesh]:
-    """An obstacle in the world; a bench of body and slab if goals lie on it."""
+    """An obstacle; a bench of body and slab if goals lie on it."""
     size, centre = obstacle.size, obstacle.centre
     if any(_lies_on(region, obstacle, scene.cube_edge) for region in scene.goal_regions):
         top = min(SLAB_THICKNESS, size[2] / 2)
@@ -116,7 +116,7 @@ def obstacle_meshes(obstacle: Obstacle, scene: Scene) -> list[Mesh]:
 
 
 def _lies_on(region: GoalRegion, obstacle: Obstacle, edge: float) -> bool:
-    """Whether cubes with an edge [m], centred in a region, lie on an obstacle."""
+    """Whether cubes of an edge [m], centred in a region, lie on an obstacle."""
     gap = region.lower[2] - obstacle.upper[2]
     half = np.abs(obstacle.rotation) @ obstacle.size / 2
     lower, upper = obstacle.centre - half, obstacle.centre + half

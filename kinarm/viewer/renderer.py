@@ -37,7 +37,7 @@ GRID_WIDTH = 1 / 600
 """Width of the floor's lines, as a share of the picture's height."""
 
 FADING = (0.2, 3.8)
-"""The floor fades between these, beyond the camera's distance [m]."""
+"""The floor fades between these, plus the camera's distance from the origin [m]."""
 
 SHADOW_DETAIL, SHADOW_SIZES = 2, (256, 2048)
 """Texels of the shadow map per pixel, and least and most of them."""
@@ -51,7 +51,7 @@ SLAB = Finish(0xB3BDC8, roughness=0.7)
 CUBE = Finish(0x009E73, roughness=0.5)
 
 CUBE_GLOW, TOUCH_GLOW = 0x0B6B50, 0x8C2F00
-"""Light of the cube when it is reached, and of links that touch."""
+"""Light of a reached cube, and of links that touch."""
 
 
 class Renderer:
@@ -64,7 +64,7 @@ class Renderer:
     problem, width, height
         The problem, and the size of pictures [pixels].
     camera : Camera, optional
-        The camera, or a mapping or sequence of its values; that of the replay page by default.
+        The camera, or its values; as on the replay page by default.
 
     Raises
     ------
@@ -122,7 +122,7 @@ class Renderer:
         trace : array_like, shape (n, 3), optional
             Positions of the tool so far [m].
         outcome : {"success", "collision", "truncated"}, optional
-            How the episode ended, if it has; colours the trace, and lights the cube on success.
+            How the episode ended, if it has; colours trace and cube.
         contact : Contact, optional
             What would have touched; the bodies light up.
 

@@ -35,7 +35,7 @@ SIZES = {
     "cylinder": (("radius", "length"), coal.Cylinder),
     "capsule": (("radius", "length"), coal.Capsule),
 }
-"""Attributes that state the sizes of visual shapes, and the shapes."""
+"""Attributes with sizes of visual shapes, and the shapes."""
 
 SHAPES = {shape.__name__: shape for shape in (box, capsule, cylinder, housing, lathe, plate)}
 """Shapes of parts in ``industrial_arm.toml``."""
@@ -53,7 +53,7 @@ UNKNOWN = -1
 """A colour that a file does not state."""
 
 VERSION = 1
-"""Of cached meshes; to be raised when the same file makes other triangles."""
+"""To be raised when the same file makes other triangles."""
 
 logging.getLogger("trimesh").addHandler(logging.NullHandler())  # else it prints its warnings
 
@@ -219,7 +219,7 @@ def _stated_colour(material: Element) -> int | None:
 
 
 def _numbers(element: Element, name: str, where: str = "a visual shape") -> tuple[float, ...]:
-    """Numbers of an attribute, checked like those that decide about contact."""
+    """Checked numbers of an attribute."""
     check_numbers(element, where)
     return tuple(float(word) for word in element.get(name, "").split())
 
@@ -308,7 +308,7 @@ def _placed(geometry: Any, transform: NDArray[np.float64], scale: Sequence[float
 
 
 def _colour(geometry: Any, path: Path) -> int | None:
-    """Colour of a geometry as 0xRRGGBB; None if the file does not say."""
+    """Colour of a geometry as 0xRRGGBB, or None."""
     look = geometry.visual
     if look.kind is None:
         return None
