@@ -28,7 +28,7 @@ def run_rows(
     Parameters
     ----------
     kernel, n
-        Kernel for ranges of rows, and their total number.
+        Works on the rows of a range, of so many rows.
     work : int
         Estimated work [episode steps]; the calling thread does little alone.
     threads : int

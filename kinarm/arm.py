@@ -33,7 +33,7 @@ class Arm:
     specification, description : ArmSpecification and Description
         What it was made of, and the URDF, reduced to the tool's chain.
     model, geometry : pinocchio.Model and pinocchio.GeometryModel
-        Kinematics, and collision shapes without pairs: primitives, or convex hulls of meshes.
+        Kinematics, and collision shapes: primitives, or convex hulls of meshes; no pairs.
     n_actuated : int
         Joints, the first ones, that actions move; the others stay at `home`.
     home : ndarray, shape (n_joints,)
@@ -71,8 +71,8 @@ class Arm:
         Parameters
         ----------
         arm : ArmSpecification, str or Path
-            A name of `arm_names`, such as ``"paper"`` or ``"ur5"``, the path of a URDF or of an
-            arm file, or a specification.
+            A name of `arm_names`, such as ``"ur5"``, a path of a URDF or arm file, or a
+            specification.
         **changes
             Fields of `ArmSpecification` to replace.
 

@@ -144,7 +144,7 @@ class MotionBounds(NamedTuple):
 
 
 def link_lengths(chain: Chain) -> NDArray[np.float64]:
-    """Bound on the distance of each joint's origin from the last [m], shape (n,)."""
+    """Bound on the distance of each joint's origin from the one before [m], shape (n,)."""
     slide = np.where(chain.prismatic, np.fmax(np.abs(chain.lower), np.abs(chain.upper)), 0.0)
     lengths: NDArray[np.float64] = np.linalg.norm(chain.translation, axis=1) + slide
     return lengths

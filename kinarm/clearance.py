@@ -1,6 +1,6 @@
 """Distances from contact, frequencies of contact at random, and goals in reach.
 
-That no configuration is found for a goal proves nothing, unlike the oracle.
+That no configuration is found for a goal proves nothing; the oracle does.
 """
 
 from dataclasses import dataclass
@@ -29,10 +29,9 @@ class Clearance(NamedTuple):
     ----------
     distance : ndarray, shape (...,)
         How far the closest pair is apart [m]; in contact, minus the way to come apart. Within
-        2e-6 m of contact, Coal's verdict may differ on shapes other than capsules, spheres and the
-        ground.
+        2e-6 m of contact, only Coal's verdicts on capsules, spheres and the ground surely agree.
     bodies : ndarray of str, shape (..., 2)
-        Names of the closest pair.
+        Names of the two.
     points : ndarray, shape (..., 2, 3)
         Closest points on each, in the world [m].
     """

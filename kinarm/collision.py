@@ -63,7 +63,7 @@ class ContactModel:
     Attributes
     ----------
     arm, geometry : Arm and pinocchio.GeometryModel
-        The arm, and shapes of arm and scene with the tested pairs.
+        The arm, and shapes of arm and scene with the pairs.
     body_names : tuple of str
         Readable name of each of these shapes.
     shapes : ContactShapes
@@ -254,7 +254,7 @@ def body_names(arm: Arm) -> tuple[str, ...]:
 
 
 def _candidate_pairs(arm: Arm, geometry: pin.GeometryModel, n_shapes: int) -> list[tuple[int, int]]:
-    """All pairs that move against each other and are not allowed to touch."""
+    """All pairs that move against each other, but those that are allowed."""
     parent = [shape.parentJoint for shape in geometry.geometryObjects]
     links = _links(arm)
     allowed = {frozenset(contact.links) for contact in arm.allowed_contacts}

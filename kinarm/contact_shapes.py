@@ -49,7 +49,7 @@ class Enclosure(NamedTuple):
     rounding: float
 
     def moved(self, placement: pin.SE3) -> "Enclosure":
-        """The same shape elsewhere."""
+        """The same one elsewhere."""
         corners = np.array([placement.act(each) for each in self.corners])
         return Enclosure(corners, self.rounding)
 
@@ -85,7 +85,7 @@ def core(shape: pin.GeometryObject) -> tuple[Array, float]:
 
 
 def _prism(radius: float, half_length: float) -> Array:
-    """Corners of a prism around a cylinder, shape (n, 3)."""
+    """Corners of a prism about a cylinder, shape (n, 3)."""
     angles = np.arange(SIDES) * (2 * np.pi / SIDES)
     ring = radius / np.cos(np.pi / SIDES) * np.stack([np.cos(angles), np.sin(angles)], axis=1)
     ends = (np.full((SIDES, 1), end) for end in (-half_length, half_length))
@@ -155,8 +155,7 @@ class ContactShapes(NamedTuple):
     exact : ndarray of bool, shape (n_shapes,)
         Whether the capsule equals the shape.
     bodies : ndarray of int, shape (n_bodies, 3)
-        First corner, the one after the last, and the joint frame that carries the body: 0 is the
-        world, k the k-th joint.
+        First corner, the one after the last, and joint frame: 0 is the world, k the k-th joint.
     corners : ndarray, shape (n_corners, 3)
         Corners in that frame [m].
     rounding : ndarray, shape (n_bodies,)
@@ -164,8 +163,8 @@ class ContactShapes(NamedTuple):
     extents : ndarray, shape (n_bodies, 2, 3)
         Lower and upper ends of the corners [m].
     planes : ndarray of int, shape (n_pairs, 4)
-        Body that carries the separating plane, or ``GROUND``; body that moves against it; first
-        axis that moves it, and the one after the last.
+        Carrier of the separating plane, or ``GROUND``; mover against it; its first axis, and the
+        one after the last.
     proxies : ndarray of int, shape (n_pairs, 2, 2)
         Bodies that stand for these two: in every step, and where it is close.
     farthest : ndarray, shape (n_actuated,)

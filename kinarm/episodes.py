@@ -80,8 +80,8 @@ class Episodes(NamedTuple):
     Attributes
     ----------
     status, steps, stop : ndarray of int, shape (n,)
-        `RUNNING`, `PAUSED`, `SUCCESS`, `COLLISION` or `TRUNCATED`; steps taken; step count at which
-        an episode is handed back.
+        `RUNNING`, `PAUSED`, `SUCCESS`, `COLLISION` or `TRUNCATED`; steps taken; step at which to
+        hand an episode back.
     q, target : ndarray, shape (n, n_joints)
         Configuration, and target of the step under way [rad or m].
     doubt : ndarray of int, shape (n,)
@@ -89,7 +89,7 @@ class Episodes(NamedTuple):
     touched : ndarray of int, shape (n,)
         Number, from 1, of the pair that refused the last step; 0 if none or unknown.
     cleared : ndarray of bool, shape (n,)
-        Whether Coal found the step under way free.
+        Coal has found the step under way free.
     planes : ndarray, shape (n, n_pairs, PLANE)
         Separating plane of each pair and height above it at ``q``; see ``kinarm.kernels.planes``.
     goal, distance : ndarray, shape (n, 3) and (n,)
@@ -136,8 +136,8 @@ class StepResult(NamedTuple):
     Attributes
     ----------
     numbers : ndarray, shape (2 + n_terms, n)
-        Rewards, distances of the tool from the goal [m], and weighted terms, in the order of
-        `kinarm.REWARD_TERMS`. Rewards are zero for episodes that were over.
+        Rewards, distances to the goal [m], and weighted terms, as in `kinarm.REWARD_TERMS`.
+        Rewards are zero for episodes that were over.
     flags : ndarray of bool, shape (3, n)
         Truncation, success and refusal by contact; false for episodes that go on or were over.
     contact : ndarray of int, shape (n,)
@@ -201,9 +201,9 @@ class Rollouts:
     success, collision : ndarray of bool, shape (n,)
         How episodes ended; neither means truncation at the horizon.
     steps, distance, returns : ndarray, shape (n,)
-        Steps taken, final distances of the tool from the goal [m], and sums of rewards.
+        Steps taken, final distances to the goal [m], and sums of rewards.
     configurations, targets : ndarray, shape (n, n_joints)
-        Final configurations, and targets of last steps, which differ if those were refused.
+        Final configurations, and where the last step led, which differs if it was refused.
     moments : ndarray, shape (n, 2, n_observations), or empty
         Sums of the observations acted upon, less the shift, and their squares.
     paths : ndarray, shape (n, horizon + 1, n_joints), or empty
@@ -229,9 +229,9 @@ class Rollouts:
         Parameters
         ----------
         starts, episodes
-            Start configurations, shape (n, n_joints) [rad or m], and the episodes.
+            Where they started, shape (n, n_joints) [rad or m], and the episodes.
         copy : bool
-            Copy the arrays, so that the episodes' may be used again.
+            Copy their arrays, which may then serve others.
         """
         kept = partial(np.array, copy=copy or None)
         rollouts = cls(

@@ -118,7 +118,7 @@ class OutputError(KinarmError):
 
 
 class WorkerError(KinarmError):
-    """A worker process ended."""
+    """A worker process ended unexpectedly."""
 
     exit_status = 1
 
@@ -131,7 +131,7 @@ class TrainingFailedError(KinarmError):
     reasons : mapping of str to str
         Reasons of a line, by the trainings' names.
     trainings : int
-        Number of trainings of the experiment.
+        Trainings of the experiment.
     """
 
     exit_status = 1

@@ -45,7 +45,7 @@ class FailedScenarios(NamedTuple):
 
     @classmethod
     def none(cls, n_joints: int) -> "FailedScenarios":
-        """No scenarios, before the first failure."""
+        """Before the first failure."""
         return cls(np.empty((0, n_joints)), np.empty((0, 3)))
 
     def followed_by(

@@ -43,7 +43,7 @@ class InverseSolutions:
     Attributes
     ----------
     configurations : ndarray, shape (m, n_joints)
-        Target by target; solutions of one are in order of their largest move [rad or m].
+        Target by target, those of one with the smallest largest move first [rad or m].
     owner : ndarray of int, shape (m,)
         Target of each.
     isolated : bool
@@ -124,7 +124,7 @@ class Kinematics(ABC):
     def _of_frame(
         self, configurations: ArrayLike, frame: str | None, shape: tuple[int, int]
     ) -> Array:
-        """Arrays of a shape, filled in at each configuration."""
+        """Fill in an array of a shape at each configuration."""
         q, one = one_or_many("configurations", configurations, (self.arm.n_joints,))
         filled = np.zeros((len(q), *shape))
         if frame is not None and frame not in self.frames:
@@ -161,18 +161,18 @@ class Kinematics(ABC):
         directions : array_like, shape (3,) or (n, 3), optional
             Directions of the tool's axis.
         near : array_like, shape (n_joints,), optional
-            Solutions nearest to it come first, and of those that differ by whole turns, the nearest
-            is returned. Joints that do not move rest there. Home by default [rad or m].
+            Solutions nearest to it come first; of whole turns the nearest is returned. Joints that
+            do not move rest there. Home by default [rad or m].
         free : bool
             Keep only solutions without contact.
         tool_axis : array_like, shape (3,), optional
             The tool's axis in the tool frame; by default along the last joint's axis, away from the
             joint before.
         joints : int, optional
-            Number of joints that move, from the base. By default those that actions move for
-            positions, and all that matter for poses.
+            Number of joints that move, from the base; by default the actuated ones for positions,
+            and all that matter for poses.
         turns : bool
-            Return solutions that differ by whole turns one by one.
+            Give solutions that differ by whole turns one by one.
         most : int
             Largest number of solutions of a target, before contact and turns.
         separation : float, optional

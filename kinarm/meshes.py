@@ -29,7 +29,7 @@ INDICES = re.compile(r"\s*(?:-?\d{1,9}(?:\s+|$))*")
 NUMBERS = re.compile(r"\s*(?:[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?(?:\s+|$))*")
 
 FLAT = 1e-9
-"""Thickness over width below which there is no volume."""
+"""Thickness over width of what has no volume."""
 
 VERSION = 1
 """To be raised when the same mesh gets another hull."""

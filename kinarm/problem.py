@@ -83,8 +83,7 @@ class ReachProblem(Checked):
         ----------
         problem : str, Path, mapping or ReachProblem
             ``"left"``, ``"right"`` or ``"both"``, the paper's tasks 1, 2 and 3, or another of
-            `problem_names`; the path of a TOML file; what `to_json` returned; or a problem, which
-            is returned itself.
+            `problem_names`; the path of a TOML file; what `to_json` returned; or a problem.
         """
         if isinstance(problem, ReachProblem):
             return problem

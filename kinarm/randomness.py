@@ -1,7 +1,8 @@
 """Random generators by purpose, which never share numbers; and even points.
 
-A generator's key is the hash of its purpose's name and own numbers, at least four in all. Trials of
-an evaluation (``kinarm.evaluation.trials.trial_generator``) are older: their keys have two.
+A generator's key is the hash of its purpose's name, four numbers, and then numbers of its own.
+Trials of an evaluation (``kinarm.evaluation.trials.trial_generator``) are older: their keys have
+two.
 """
 
 import hashlib

@@ -51,7 +51,7 @@ class Recording:
     refused : ndarray, shape (n_joints,), optional
         Configuration of the refused move at which they touch first [rad or m].
     steps_lower_bound : int, optional
-        Steps without which no motion reaches the goal, if proven.
+        Proven: no motion reaches the goal in fewer steps.
     provenance : dict
         Where it comes from, for JSON.
 
@@ -189,7 +189,7 @@ def record_rollouts(
     numbers : sequence of int, optional
         Which rollouts; all by default. It becomes the number of the trial.
     steps_lower_bound : callable, optional
-        Gives the proven least number of steps of a trial, or None.
+        Gives the proven number of steps of a trial, or None.
     provenance : dict, optional
         Where they come from, for JSON.
 

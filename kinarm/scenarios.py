@@ -22,15 +22,15 @@ def draw_scenarios(
 
     Goals are uniform over the task's regions. Each actuated joint starts uniformly within its
     limits, scaled by the start spread, or the arm starts at one of the task's configurations,
-    without contact and farther from the goal than the tolerance. After 2000 attempts that is a
-    `kinarm.ProblemError`.
+    without contact and farther from the goal than the tolerance. If none is found in 2000 attempts,
+    that is a `kinarm.ProblemError`.
 
     Parameters
     ----------
     world, rng, count
         World of the problem, source of randomness, and number.
     start_spread : float, optional
-        That of the task by default.
+        Instead of the task's.
     """
     starts, goals = draw_for_each(world, [rng], count, start_spread=start_spread)
     return starts[0], goals[0]

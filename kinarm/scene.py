@@ -1,6 +1,6 @@
 """The world around the arm: the ground, solid boxes, and places of goals.
 
-Empty boxes and repeated names are a `ProblemError`.
+What is empty or named twice is a `ProblemError`.
 """
 
 import math

@@ -161,9 +161,9 @@ class Simulator:
         Parameters
         ----------
         policies : Networks, policy, sequence of policies, or function
-            One policy for all episodes, or one for each. Those that offer ``networks()`` run
-            compiled; a function from observations (n, n_observations) to actions (n, n_actions) is
-            called once a step for all running episodes.
+            One policy for all episodes, or one for each. Those with ``networks()`` run compiled; a
+            function from observations (n, n_observations) to actions (n, n_actions) is called once
+            a step.
         starts, goals, record
             As for `reset`.
         policy_index : array_like of int, shape (n,), optional

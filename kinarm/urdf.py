@@ -40,7 +40,7 @@ class Description(NamedTuple):
     tool_frame : str
         Link whose origin is the tool point.
     held : dict
-        Positions of joints that became fixed, by name [rad or m].
+        Positions at which joints were fixed, by name [rad or m].
     notes : tuple of str
         Choices where nothing was said.
     """
@@ -187,7 +187,7 @@ def _held_positions(
     kept: Collection[str],
     asked: Mapping[str, float],
 ) -> dict[str, float]:
-    """Positions of the moving joints that are not kept."""
+    """Where the moving joints stay that are not kept."""
     fixed = [joints[name] for name in moving if name not in kept]
     leaders = [joint for joint in fixed if joint.mimics is None or joint.name in asked]
     positions = {joint.name: asked.get(joint.name, _near_zero(joint)) for joint in leaders}

@@ -119,7 +119,7 @@ def _check_shape(collision: Element, where: str) -> None:
 def check_numbers(element: Element, where: str) -> None:
     """Check and rewrite the numbers of an element, called ``where``.
 
-    Raises ArmError if any are missing, too many, no numbers or out of range.
+    Raises ArmError if one is missing, none, too many or out of range.
     """
     least, most = RANGES.get(element.tag, (-FARTHEST, FARTHEST))
     for name, (count, default) in NUMBERS.get(element.tag, {}).items():

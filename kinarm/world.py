@@ -41,7 +41,7 @@ class World(Kinematics):
     problem, arm : ReachProblem and Arm
         What it was built from.
     contact_model : ContactModel
-        Shapes and tested pairs.
+        Shapes that may touch.
     rules : Rules
         Task and motion limits for the kernels.
     """
@@ -125,7 +125,7 @@ class World(Kinematics):
         return self._begun_at(configurations, goals).distance
 
     def screen(self, configurations: ArrayLike) -> tuple[Array, NDArray[np.bool_]]:
-        """Tool points, shape (n, 3) [m], and whether configurations touch something, shape (n,).
+        """Tool points, shape (n, 3) [m], and which configurations touch something, shape (n,).
 
         Takes joint positions, shape (n, n_joints) [rad or m].
         """

@@ -24,7 +24,7 @@ from kinarm.task import REWARD_TERMS
 
 Array = NDArray[np.float64]
 Observations = Any
-"""An array, or a dictionary of arrays, with a row per arm."""
+"""An array, or a dictionary of arrays; one row per arm."""
 
 Outcome = tuple[Array, NDArray[np.bool_], NDArray[np.bool_]]
 """Rewards, and which episodes terminated or were truncated, shape (n,) each."""
@@ -147,7 +147,7 @@ class ArmEnvironment(Lifecycle):
     simulator : Simulator
         The simulator that is stepped.
     interface : Interface
-        How it shows the simulator.
+        How it is shown.
     """
 
     simulator: Simulator

@@ -64,7 +64,7 @@ class GoalRewards:
         Parameters
         ----------
         achieved_goal, desired_goal, info
-            As for `compute_reward`; ``info`` has no effect.
+            As for `compute_reward`; infos have no effect.
         """
         return _distance(achieved_goal, desired_goal) <= self.simulator.task.tolerance
 
@@ -85,7 +85,7 @@ class GoalInterface(GoalRewards, Interface):
     """Goals as a dictionary, and rewards for any goals.
 
     A move that would touch something is refused and costs the problem's reward for a collision.
-    The episode goes on, so giving up never pays. Arguments are those of `ReachGoalEnv`.
+    The episode goes on, so giving up never pays. Arguments are as for `ReachGoalEnv`.
     """
 
     tells_terms = False
@@ -163,8 +163,7 @@ class ReachGoalEnv(GoalEnvironment, ReachEnv):
     problem : ReachProblem, str or Path
         As for `ReachEnv`.
     reward_type : {"sparse", "dense"}
-        -1 for every step that does not reach the goal and 0 for the one that does, or minus the
-        distance [m].
+        -1 for each step but 0 for one that reaches the goal, or minus the distance [m].
     **settings
         As for `ReachEnv`; only ``collision`` of the problem's own reward has an effect.
 

@@ -57,8 +57,7 @@ class EnvPictures:
     num_envs : int
         Number of arms.
     width, height : int
-        Size of a picture [pixels]. More than four arms share the area of four: pictures of 64 have
-        a quarter of the width and height.
+        Size of a picture [pixels]. More than four arms share the area of four.
     camera : Camera, optional
         Place of the camera; that of the replay page by default.
     """

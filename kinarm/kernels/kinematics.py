@@ -138,8 +138,7 @@ def follow_frame(
     configurations : ndarray, shape (n, n_joints)
         Joint positions [rad or m].
     filled : ndarray, shape (n, 4, 4) or (n, 6, n_joints)
-        Where its poses in the world go [m], or its Jacobians, without columns of joints beyond the
-        frame.
+        Where its poses in the world go [m], or its Jacobians, up to the joint of the frame.
     """
     poses = np.zeros((configurations.shape[1] + 1, POSE))
     for row in range(first, last):

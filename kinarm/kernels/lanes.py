@@ -81,7 +81,7 @@ def _broadcast(_: Any, builder: Any, given: types.Type, __: types.Type, value: A
 
 
 for _access, _template in ((operator.getitem, GetItemBuffer), (operator.setitem, SetItemBuffer)):
-    # Most of what kernels do is reading and writing elements.
+    # Most of what kernels do is to read and write elements.
     infer_global(_access)(type(_template.__name__, (_template,), {"metadata": FIRST}))
 
 

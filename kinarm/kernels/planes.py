@@ -27,7 +27,7 @@ EVERYDAY, FINE = 0, 1
 """Levels of `ContactShapes.proxies`."""
 
 OFFSET, GAP = 3, 4
-"""Entries of a plane behind its normal."""
+"""Entries of a plane after its normal."""
 
 ALTERNATIONS = 3
 """Projections between box and segment for a first plane."""
@@ -44,7 +44,7 @@ COARSE = 0.02
 
 @inlined
 def axis_in_world(shapes: ContactShapes, body: int, poses: Array) -> tuple[Vector, Vector]:
-    """End points of the axis of a body's capsule, in the world [m]."""
+    """End points of the axis of a body's capsule in the world [m]."""
     link, axis = shapes.bodies[body, 2], shapes.capsules[body]
     start = to_world(poses, link, axis[0], axis[1], axis[2])
     return start, to_world(poses, link, axis[3], axis[4], axis[5])

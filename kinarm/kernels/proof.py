@@ -228,7 +228,7 @@ def prove_configurations(
 ) -> int:
     """Bits of the arms that are proven free; ``touched`` are those that are not.
 
-    Takes the poses ``after``, and gives pairs their first planes.
+    Takes the poses ``after``, and gives all pairs a first plane.
     """
     least = 0.0 * block.q[0, 0] + 1.0
     for pair in range(shapes.planes.shape[0]):

@@ -68,7 +68,7 @@ class RecordType(types.Type):
 class Record:
     """Named arrays, numbers and records for kernels, by `recorded` or `Layout`.
 
-    The content of an array may change, but not which array it is.
+    What is in an array may change, but not which array it is.
 
     Attributes
     ----------
@@ -130,8 +130,7 @@ class Layout:
     name : str
         Name of the type.
     shapes : mapping
-        Type of entries, `lanes`, float64 or int64, and shape of each array, of which lengths may be
-        `Fixed`.
+        Type of entries, `lanes`, float64 or int64, and shape of each array; lengths may be `Fixed`.
     """
 
     def __init__(self, name: str, shapes: Shapes) -> None:

@@ -123,7 +123,7 @@ def screen(
     first, last : int
         Range of rows.
     block, alone, chain, shapes
-        Work space, the arm, and its surroundings.
+        Work space, the arm, and what may touch.
     configurations : ndarray, shape (n, n_joints)
         Joint positions [rad or m].
     tools, free, touching : ndarray, shape (n, 3), and of bool, shape (n,)

@@ -273,7 +273,7 @@ def draw_arm(window: Visualizer, arm: Arm) -> list[Visualizer]:
 def draw_trace(
     window: Visualizer, points: NDArray[np.float64], outcome: str | None, scale: float
 ) -> None:
-    """Draw the way of the tool, if there are points.
+    """Draw the way of the tool; none for a point.
 
     Parameters
     ----------

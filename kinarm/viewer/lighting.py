@@ -269,7 +269,7 @@ def irradiance_map() -> Array:
 
 @lru_cache(maxsize=64)
 def reflection_map(roughness: float) -> Array:
-    """The room's light as a surface of a roughness mirrors it, shape (n, n, 3)."""
+    """Light of the room as surfaces of a roughness mirror it, shape (n, n, 3)."""
     square = roughness**4
 
     def lobe(cosine: Array) -> Array:

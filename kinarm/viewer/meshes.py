@@ -15,7 +15,7 @@ SEGMENTS = 40
 """Straight pieces of a full circle."""
 
 CREASE = np.cos(np.deg2rad(38.0))
-"""Cosine of the angle above which faces keep the edge between them."""
+"""Faces that meet at a larger angle than this keep their edge."""
 
 
 @dataclass(frozen=True, eq=False)

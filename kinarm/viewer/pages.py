@@ -1,4 +1,4 @@
-"""Pages of recordings and arms: one HTML file that needs no network, only a browser with WebGL."""
+"""Pages of recordings and arms: HTML that needs WebGL, but no network."""
 
 import base64
 import gzip

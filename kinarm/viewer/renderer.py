@@ -120,7 +120,7 @@ class Renderer:
         configuration, goal : array_like, shapes (n_joints,) and (3,)
             Joint positions [rad or m], and the cube's centre [m].
         trace : array_like, shape (n, 3), optional
-            Positions of the tool so far [m].
+            Where the tool has been [m].
         outcome : {"success", "collision", "truncated"}, optional
             How the episode ended, if it has; colours trace and cube.
         contact : Contact, optional

@@ -260,7 +260,7 @@ def _versions() -> list[str]:
 
 
 def _simplified_arrays(path: Path, scale: Sequence[float]) -> dict[str, ArrayLike]:
-    """Triangles and colours of a file, as they are cached."""
+    """Triangles and colours of a file, as they are kept."""
     pieces = _pieces(path, scale)
     colours = [UNKNOWN if piece.colour is None else piece.colour for piece in pieces]
     arrays: dict[str, ArrayLike] = {"colours": colours}
