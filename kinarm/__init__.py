@@ -1,4 +1,4 @@
-"""kinarm: learn to reach with a simulated six-axis arm, and know how good the result is."""
+"""kinarm: learn to reach with a simulated six-axis arm, and know how good it is."""
 
 from kinarm import _interrupts as _interrupts  # first: a command answers requests to end from here
 
@@ -10,18 +10,16 @@ import lazy_loader
 __version__ = "1.0.0"
 
 SEMANTICS = "4"
-"""Version of all that simulator and learners compute, every number that settings and seeds make.
+"""Version of every number that simulator and learners compute from settings and seeds.
 
-Drawn starts, goals and trials, rollouts and iterations of the learners; what the oracle makes of
-them has a version of its own, `kinarm.policies.oracle.ORACLE_SEMANTICS`. Finished trainings are
-recognised by it; how the code is written, named and laid out does not matter.
+It covers starts, goals, trials, rollouts and learning, and identifies finished trainings; the
+oracle's is `kinarm.policies.oracle.ORACLE_SEMANTICS`. How code is written does not matter.
 
-Raise it in the commit that changes such a number on purpose, and record the golden digests anew:
-``python tests/golden/digests.py --record`` (which refuses other digests under the same version, as
-the tests do). Finished trainings are then made anew.
+Raise it in the commit that changes a number on purpose, and record the golden digests anew:
+``python tests/golden/digests.py --record`` (which refuses others under the same version).
 """
 
-# What there is stands in __init__.pyi, and is imported when it is first used.
+# What there is stands in __init__.pyi, and is imported on first use.
 __getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)
 
 # A command starts in two thirds of the time without Gymnasium.
@@ -30,5 +28,5 @@ if not _interrupts.is_command():  # pragma: no branch - tests are no command, an
 
 _root = Path(__file__).resolve().parent.parent
 if (_root / "pyproject.toml").is_file():  # pragma: no branch - tests/packaging runs a wheel
-    # In a clone the sub-packages lie beside this folder, whatever is installed.
+    # In a clone the sub-packages lie beside this folder.
     __path__.append(str(_root))

@@ -1,4 +1,4 @@
-"""``kinarm``, or ``python -m kinarm``, lists the commands; ``kinarm eval`` runs one of them."""
+"""``kinarm``, or ``python -m kinarm``, lists commands; ``kinarm eval`` runs one."""
 
 import argparse
 import subprocess
@@ -21,11 +21,11 @@ COMMANDS = {
     "bench": ("kinarm.evaluation.commands.bench", "measure how fast everything is here"),
     "reproduce": ("kinarm.evaluation.commands.reproduce", "reproduce what the paper reports"),
 }
-"""Modules of the commands, and what one wants who uses them, by name without ``kinarm-``."""
+"""Modules and purposes of the commands, by name without ``kinarm-``."""
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
-    """Run the command that is named, or list all of them."""
+    """Run the named command, or list all."""
     typed = list(sys.argv[1:] if arguments is None else arguments)
     if typed[:1] == ["--"]:
         del typed[0]
@@ -36,7 +36,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
 
 
 def _explain(typed: Sequence[str]) -> None:
-    """Print the help, the version or completion scripts, or refuse an unknown command."""
+    """Print help, version or completion, or refuse an unknown command."""
     lines = (f"  {purpose:<42} {PROG}-{name}" for name, (_, purpose) in COMMANDS.items())
     parser = CommandParser(
         prog=PROG,

@@ -1,4 +1,4 @@
-"""Command lines: their options, from the fields of dataclasses, and how they run and end."""
+"""Command lines: options from fields of dataclasses, runs and ends."""
 
 import argparse
 import io
@@ -22,7 +22,7 @@ METAVARS = {int: "N", float: "X", Path: "FILE"}
 
 Request = TypeVar("Request")
 Commands = Mapping[str, tuple[type, Callable[[Any], None]]]
-"""By name, the request of each command, and what runs it and prints what it came to."""
+"""Requests of commands by name, and what runs them."""
 
 
 def add_options(
@@ -33,29 +33,28 @@ def add_options(
     explicit: bool = False,
     names: Mapping[str, Sequence[str]] | None = None,
 ) -> None:
-    """Add an option for every field of a dataclass; only those that are given are parsed.
+    """Add an option for every field of a dataclass; only given ones are parsed.
 
-    Names, types and help come from the dataclass and its docstring. The fields of a nested
-    dataclass get its name as a prefix, such as ``--reward-success``. A class attribute ``GROUPS``
-    puts fields into groups of options by their titles; ``DEFAULTS`` says what happens without an
-    option whose field has no telling default, and such a field need not be given.
+    Names, types and help come from the dataclass and its docstring. Fields of a nested dataclass
+    get its name as a prefix, such as ``--reward-success``. A class attribute ``GROUPS`` puts fields
+    into titled groups; ``DEFAULTS`` says what happens without an option whose field has no telling
+    default, and such a field may be left out.
 
-    A field's metadata may hold ``flag`` (another name of the option, or one without dashes for a
-    positional argument), ``metavar``, ``repeat`` (a tuple is collected from repetitions of the
-    option of one value each, else of several), ``parse`` (makes the value of the text),
-    ``names`` (a function that lists the names that an option takes, for help and completion) and
-    ``completes`` (the same, for completion alone).
+    A field's metadata may hold ``flag`` (another name of the option; without dashes, of a
+    positional argument), ``metavar``, ``repeat`` (repetitions of the option give a tuple, else its
+    several values), ``parse`` (makes the value of the text), ``names`` (lists names for help and
+    completion) and ``completes`` (lists them for completion alone).
 
     Parameters
     ----------
     parser, kind
         Where to add them, and the dataclass.
     skip : collection of str
-        Fields that get no option.
+        Fields without an option.
     explicit : bool
-        Whether every default is said, and what is false by default has an option ``--no-x``.
+        Say every default, and let what is false by default have ``--no-x``.
     names : mapping, optional
-        Names that options take, by field, where the metadata do not list them.
+        Names for options, by field, if the metadata list none.
     """
     groups: Mapping[str, Sequence[str]] = getattr(kind, "GROUPS", {})
     titles = {name: title for title, members in groups.items() for name in members}
@@ -77,7 +76,7 @@ def _add_option(
     explicit: bool,
     names: Mapping[str, Sequence[str]],
 ) -> None:
-    """Add the option of one field, or those of a nested dataclass."""
+    """Add the options of a field."""
     hint = alternatives(field_types(kind)[item.name])[0]
     if isinstance(hint, type) and is_dataclass(hint):
         for inner in init_fields(hint).values():
@@ -127,7 +126,7 @@ def _value_options(item: Field[Any], hint: Any, flag: str) -> dict[str, Any]:
 
 
 def _argument_type(make: Callable[[str], Any], hint: Any) -> Callable[[str], Any]:
-    """Makes the value of a text, which may be refused."""
+    """Make the value of a text, or refuse it."""
 
     def parsed(text: str) -> Any:
         if text is argparse.SUPPRESS:  # a positional argument that is not given
@@ -147,7 +146,7 @@ def _argument_type(make: Callable[[str], Any], hint: Any) -> Callable[[str], Any
 
 
 def _completes(item: Field[Any], hint: Any, known: Sequence[str]) -> Any:
-    """How a value is completed: as a ``"file"`` or ``"folder"``, or by a function's names."""
+    """Completion by ``"file"``, ``"folder"`` or a function of names."""
     if "completes" in item.metadata:
         return item.metadata["completes"]
     if known:
@@ -164,7 +163,7 @@ def option_name(item: Field[Any], prefix: str = "") -> str:
 
 
 def _default(kind: type, item: Field[Any], *, explicit: bool) -> str:
-    """Value without an option, in words; empty if that goes without saying."""
+    """Value without an option, in words; empty if it is obvious."""
     defaults: Mapping[str, str] = getattr(kind, "DEFAULTS", {})
     default = item.default
     if item.name in defaults:
@@ -179,7 +178,7 @@ def _default(kind: type, item: Field[Any], *, explicit: bool) -> str:
 
 
 def _help(said: str, names: Sequence[str], default: str) -> str:
-    """Description of a field, the names that it takes, and its default, as argparse formats it."""
+    """Description, names and default of a field, for argparse."""
     said = said.replace("`", "")
     if default:
         said = f"{said} (default: {default})"
@@ -189,7 +188,7 @@ def _help(said: str, names: Sequence[str], default: str) -> str:
 
 
 def given_options(options: argparse.Namespace, kind: type) -> dict[str, Any]:
-    """Fields of a dataclass that the command line gives; nested ones as mappings."""
+    """Given fields of a dataclass; nested ones as mappings."""
     given: dict[str, Any] = {}
     for name, value in vars(options).items():
         outer, _, inner = name.partition(".")
@@ -203,10 +202,10 @@ def given_options(options: argparse.Namespace, kind: type) -> dict[str, Any]:
 
 
 def run_command(prog: str, command: Callable[[], None]) -> NoReturn:
-    """Run a command line and turn its outcome into an exit status; here every command ends.
+    """Run a command line and exit with its status.
 
-    Status 0 is success, 1 a failure of the machine, 2 bad input, 130 an interruption; all but
-    success come with one line on standard error. A reader that closes the pipe is no failure.
+    Status 0 is success, 1 a failure of the machine, 2 bad input, 130 an interruption; all others
+    print one line on standard error. A closed pipe is no failure.
     """
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):
@@ -233,7 +232,7 @@ def _run(command: Callable[[], None]) -> int:
 
 
 def _status_of(prog: str, error: BaseException) -> int:
-    """Report an error in one line and return the status; raise faults of kinarm itself again."""
+    """Report an error in one line; return its status, or raise kinarm's faults."""
     if was_interrupted(error):
         _discard_output()
         said = str(error) if isinstance(error, KeyboardInterrupt) else ""
@@ -269,18 +268,18 @@ def run_request(
     *,
     skip: Collection[str] = (),
 ) -> NoReturn:
-    """Run a command line all of whose options are the fields of one request; see `run_command`.
+    """Run a command line whose options are the fields of a request; see `run_command`.
 
     Parameters
     ----------
     prog, kind
-        Name of the command, and its request, a dataclass whose first line says what it does.
+        The command, and its request, a dataclass whose first line describes it.
     report : callable
-        Runs a request and prints what it came to; its second argument is the command as typed.
+        Runs a request, and prints; its second argument is the command as typed.
     arguments : sequence of str, optional
-        What is typed after the name; by default that of this process.
+        Typed words; this process's by default.
     skip
-        Fields that are no options.
+        Fields without an option.
     """
     typed = sys.argv[1:] if arguments is None else arguments
     parser = Parser(prog=prog, description=_first_line(kind))
@@ -297,11 +296,11 @@ def run_commands(
     commands: Commands,
     arguments: Sequence[str] | None = None,
 ) -> NoReturn:
-    """Run a command line whose first word is one of several commands, the first by default.
+    """Run a command line whose first word is a command, the first one by default.
 
     Parameters
     ----------
-    prog, description, arguments, epilog
+    prog, description, arguments
         As for `run_request`; the description says what the program is for.
     commands : mapping
         See `Commands`.

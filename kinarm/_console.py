@@ -1,4 +1,4 @@
-"""Terminals as the commands use them: tables, what is being done, and how far it is."""
+"""Terminals of the commands: tables, activities and progress."""
 
 import math
 import os
@@ -15,13 +15,13 @@ if TYPE_CHECKING:
     from rich.table import Table
 
 UNBOUNDED = 1000
-"""Width that has room for every table."""
+"""Width with room for every table."""
 
 COMPILING = "compiling, once: up to half a minute"
-"""Activity that is told while kernels are compiled."""
+"""Activity while kernels are compiled."""
 
 LINE_SECONDS = 30.0
-"""How often a line of progress is printed where there is no terminal."""
+"""Time between lines of progress without a terminal."""
 
 _listeners: list[Callable[[str], object]] = []
 _activities = [""]
@@ -29,7 +29,7 @@ _activities = [""]
 
 @contextmanager
 def told_of_activities(listener: Callable[[str], object]) -> Iterator[None]:
-    """Tell a listener what begins, in words, and what goes on when that is over, or nothing: ""."""
+    """Tell a listener what begins, and what goes on when it is over, or ""."""
     _listeners.append(listener)
     try:
         yield
@@ -39,7 +39,7 @@ def told_of_activities(listener: Callable[[str], object]) -> Iterator[None]:
 
 @contextmanager
 def doing(activity: str) -> Iterator[None]:
-    """Tell all listeners of what takes long; the same activity within it belongs to it."""
+    """Tell listeners of what takes long, but not of the same within it."""
     if activity == _activities[-1]:
         yield
         return
@@ -58,10 +58,10 @@ def _tell() -> None:
 
 
 def open_console(*, stderr: bool = False, file: IO[str] | None = None) -> "Console":
-    """A console that prints texts as they are: names and paths hold no markup.
+    """A console that prints texts without markup.
 
-    It is as wide as the terminal. Standard output that is no terminal, and a file, are unbounded;
-    the environment variable ``COLUMNS`` sets another width of standard output.
+    It is as wide as the terminal. Piped standard output, unless ``COLUMNS`` is set in the
+    environment, and files are unbounded.
     """
     from rich.console import Console
 
@@ -73,7 +73,7 @@ def open_console(*, stderr: bool = False, file: IO[str] | None = None) -> "Conso
         markup=False,
         emoji=False,
         highlight=False,
-        force_jupyter=None if find_spec("ipywidgets") else False,  # it cannot redraw without
+        force_jupyter=None if find_spec("ipywidgets") else False,  # it needs them to redraw
     )
 
 
@@ -83,16 +83,16 @@ def print_fitting(
     expendable: Sequence[str],
     advice: str,
 ) -> None:
-    """Print a table without the columns for which there is no room, and name these.
+    """Print a table without columns that have no room, and name these.
 
     Parameters
     ----------
     console, advice
         Where to print it, and how to see all columns.
     table_without : callable
-        The table without some columns, given their headings.
+        The table without the columns of given headings.
     expendable : sequence of str
-        Headings of columns that can be left out, in that order.
+        Headings to leave out, in this order.
     """
     unbounded = console.options.update(width=UNBOUNDED)
     for count in range(len(expendable) + 1):
@@ -114,9 +114,9 @@ def print_table(
     Parameters
     ----------
     headings, rows
-        A text for each column, and those of each row.
+        Texts of the headings, and of each row.
     expendable : sequence of str
-        Headings of columns that are left out, in that order, where the terminal is too narrow.
+        Headings to leave out, in this order, in narrow terminals.
     """
     from rich.table import Table
 
@@ -132,9 +132,9 @@ def print_table(
 
 @contextmanager
 def working(doing: str) -> Iterator[Callable[[str], object]]:
-    """Say on standard error what a command is doing, while it does it, if that is a terminal.
+    """Say what a command is doing on standard error, if that is a terminal.
 
-    Yields a function by which it says something else. While kernels are compiled, it says so, too.
+    Yields a function to say something else, and tells of compilation.
     """
     said = doing
     with open_console(stderr=True).status(doing) as status:
@@ -152,14 +152,14 @@ def working(doing: str) -> Iterator[Callable[[str], object]]:
 
 
 class ProgressLine:
-    """Shows progress and the remaining time: a bar on a terminal, elsewhere a line now and then.
+    """Shows progress and remaining time: a bar on a terminal, else lines now and then.
 
     Parameters
     ----------
     title, unit : str
-        What is under way, and what is counted, for the lines where there is no terminal.
+        What is under way, and what is counted.
     total : float
-        How much there is to do.
+        What there is to do.
     console : rich.console.Console, optional
         Where to show it; standard error by default.
     """
@@ -194,9 +194,9 @@ class ProgressLine:
         Parameters
         ----------
         done : float, optional
-            How much is done; as before if it is left out.
+            How much is done; unchanged by default.
         words : sequence of str
-            Texts at the end of the line, those first that matter most.
+            Texts at the line's end, most important first.
         """
         self._progress.update(self._task, completed=done)
         task = self._progress.tasks[0]

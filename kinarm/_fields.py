@@ -1,7 +1,6 @@
-"""Frozen dataclasses from plain values and back: what TOML, JSON and command lines hold.
+"""Frozen dataclasses from plain values and back, for TOML, JSON and command lines.
 
-A dataclass says once what its fields are called, which type and default they have and, in the
-Parameters of its docstring, what they mean; files, messages and options follow from that.
+Fields and their docstring's Parameters serve files, messages and options.
 """
 
 import re
@@ -28,13 +27,13 @@ field_types: Callable[[type], dict[str, Any]] = cache(get_type_hints)
 SCALARS = {bool: "true or false", int: "a whole number", float: "a number", str: "a text"}
 
 OPTIONAL: Mapping[str, Any] = {"optional": True}
-"""Metadata of a field that files and hashes hold only where it is not at its default."""
+"""Metadata of fields that files and hashes omit at their default."""
 
 
 def to_plain(value: Any) -> Any:
-    """Turn a dataclass into plain values, as TOML and JSON hold them.
+    """Turn a dataclass into plain values for TOML and JSON.
 
-    Fields that are None are left out, and those marked as ``OPTIONAL`` at their default.
+    Fields that are None are left out, and ``OPTIONAL`` ones at their default.
     """
     if is_dataclass(value):
         given = ((item, getattr(value, item.name)) for item in fields(value))
@@ -55,7 +54,7 @@ def _omitted(item: Field[Any], entry: Any) -> bool:
 
 
 def read_toml(path: Path, what: str) -> dict[str, Any]:
-    """Read a TOML file, which messages call ``what``."""
+    """Read a TOML file, called ``what`` in messages."""
     try:
         return tomllib.loads(path.read_bytes().decode())
     except OSError as error:
@@ -67,14 +66,14 @@ def read_toml(path: Path, what: str) -> dict[str, Any]:
 
 
 def take_base(entries: dict[str, Any], where: str, bases: Collection[str], default: str) -> str:
-    """Remove the entry ``base`` of a file, and return it, or the default if there is none.
+    """Remove the entry ``base`` of a file, and return it or the default.
 
     Parameters
     ----------
     entries, where
         Entries of the file, and its name.
     bases, default
-        Values that the entry may have, and one of them.
+        Possible values, one of which is the default.
     """
     base = entries.pop("base", default)
     if not isinstance(base, str) or base not in bases:
@@ -83,17 +82,16 @@ def take_base(entries: dict[str, Any], where: str, bases: Collection[str], defau
 
 
 def from_plain(kind: type[T], entries: object, where: str, path: str = "") -> T:
-    """Build a dataclass from plain values by the names of its fields.
+    """Build a dataclass from plain values by field names.
 
-    What is unknown, missing, of the wrong type or refused by the dataclass is an
-    `InvalidInputError`, in one line that names source, key and what is expected.
+    What is unknown, missing, of the wrong type or refused is an `InvalidInputError` of one line.
 
     Parameters
     ----------
     kind, entries
         The dataclass, and plain values.
     where, path : str
-        Name of their source, and those of the tables around them, such as ``"scene."``.
+        Names of their source, and of the tables around them, such as ``"scene."``.
     """
     if not isinstance(entries, Mapping):
         table = path.removesuffix(".") or "it"
@@ -119,11 +117,10 @@ def from_plain(kind: type[T], entries: object, where: str, path: str = "") -> T:
 
 
 class Checked:
-    """Base of frozen dataclasses whose fields are what their annotations and metadata say.
+    """Base of frozen dataclasses that obey their annotations and metadata.
 
-    When one is built, lists and arrays become tuples, and numbers become Python's, whole where
-    whole ones are asked for. What remains wrong is refused, numbers out of range included; see
-    `kinarm.errors.check_range`.
+    Lists and arrays become tuples, and numbers become Python's. The rest is refused, as are numbers
+    out of range; see `kinarm.errors.check_range`.
     """
 
     def __post_init__(self) -> None:
@@ -136,7 +133,7 @@ class Checked:
 
 
 def _value(hint: Any, entry: Any, where: str, path: str, kind: type) -> Any:
-    """Convert a value to what a type hint asks for."""
+    """Convert a value to a type hint."""
     if hint is Any or (type(entry) is hint and hint is not float):
         return entry
     choices = alternatives(hint)
@@ -174,7 +171,7 @@ def _value(hint: Any, entry: Any, where: str, path: str, kind: type) -> Any:
 
 
 def _is_scalar(hint: Any, entry: object) -> bool:
-    """Whether a plain value is one of a type: a whole number is a number, a truth value is none."""
+    """Whether a plain value has a type: truth values are no numbers."""
     if hint in (str, Path):
         return isinstance(entry, str | Path)
     if hint is bool or isinstance(entry, bool):
@@ -211,7 +208,7 @@ def init_fields(kind: type) -> dict[str, Field[Any]]:
 
 @cache
 def field_docs(kind: type) -> dict[str, str]:
-    """Descriptions of fields, from the Parameters of a dataclass and of its bases."""
+    """Descriptions of fields in docstrings of a dataclass and its bases."""
     found: dict[str, str] = {}
     for base in reversed(kind.__mro__):
         text = re.sub(r"(?m)^    ", "", base.__dict__.get("__doc__") or "")
@@ -230,7 +227,7 @@ def summary_of(kind: type, name: str) -> str:
 
 
 def _unit(kind: type, path: str) -> str:
-    """Unit of a field as its description states it, in brackets; nothing if it has none."""
+    """Unit of a field in brackets; empty if none."""
     name = path.rpartition(".")[2].partition("[")[0]
     unit = UNIT.search(summary_of(kind, name))
     return f" [{unit.group(1)}]" if unit else ""

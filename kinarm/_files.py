@@ -1,8 +1,7 @@
-"""Files: written so that a reader never sees half of one, and read so that damage is one line.
+"""Files: written whole or not at all, and read so that damage is one line.
 
-Each function that writes raises `OutputError`, in one line, where it cannot. Arrays lie in ``.npz``
-files with a header in JSON, without pickle; `load_archive` alone reads them. Results that are only
-computed to be used again lie in the user's cache folder.
+What cannot be written is an `OutputError`. Arrays lie in ``.npz`` files with a header in JSON,
+without pickle, which `load_archive` alone reads.
 """
 
 import fcntl
@@ -26,14 +25,13 @@ from numpy.typing import ArrayLike, NDArray
 from kinarm.errors import InvalidInputError, KinarmError, OutputError, UnknownNameError
 
 is_file, is_folder = os.path.isfile, os.path.isdir
-"""Whether there is such a file or folder; not, if none can have this name."""
-
+"""Whether a file or folder exists; impossible names are none."""
 
 KINDS = "biufU"
-"""Kinds of what an array may hold: truth values, whole numbers, numbers and texts."""
+"""Kinds of arrays: truth values, whole numbers, numbers and texts."""
 
 CACHE_VARIABLE = "KINARM_CACHE"
-"""Environment variable that names another cache folder."""
+"""Environment variable for another cache folder."""
 
 Arrays = Mapping[str, NDArray[Any]]
 
@@ -48,12 +46,12 @@ def _reported(path: str | Path, doing: str = "write") -> Iterator[None]:
 
 
 def write_atomically(path: str | Path, write: Callable[[IO[bytes]], object]) -> None:
-    """Let ``write`` fill a file beside its place, which is moved there when it is complete.
+    """Let ``write`` fill a file beside its place, which then is moved there.
 
-    A link is followed. What is no regular file, such as a device, is written to as it stands.
-    What a process was killed over lies in the way of nobody: the next one writes over it.
+    Links are followed, and devices written to directly. What a killed process leaves is overwritten
+    by the next one.
     """
-    target = Path(os.path.realpath(path))
+    target = absolute(path)
     beside = target.with_name(f".{target.name}.part")
     with _reported(path):
         if target.exists() and not (target.is_file() or target.is_dir()):
@@ -81,7 +79,7 @@ def write_text(path: str | Path, text: str) -> None:
 
 @contextmanager
 def only_writer(path: str | Path) -> Iterator[None]:
-    """Keep other processes from making the same output, a file or a folder, meanwhile."""
+    """Keep other processes from making the same output."""
     lock = _lock_of(path)
     with _reported(path):
         try:
@@ -96,7 +94,7 @@ def only_writer(path: str | Path) -> Iterator[None]:
 
 
 def is_being_written(path: str | Path) -> bool:
-    """Whether a process is making an output as its `only_writer`."""
+    """Whether a process is the `only_writer` of an output."""
     try:
         with _lock_of(path).open("rb") as file:
             fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
@@ -108,13 +106,13 @@ def is_being_written(path: str | Path) -> bool:
 
 
 def _lock_of(path: str | Path) -> Path:
-    """The file that is locked while an output is made."""
-    target = Path(os.path.realpath(path))
+    """File that is locked while an output is made."""
+    target = absolute(path)
     return target / ".lock" if target.is_dir() else target.with_name(f".{target.name}.lock")
 
 
 def _locked(path: Path, *, wait: bool = False) -> IO[bytes]:
-    """Open and lock a file that its last owner may just be moving or removing."""
+    """Open and lock a file, even while it is moved or removed."""
     operation = fcntl.LOCK_EX if wait else fcntl.LOCK_EX | fcntl.LOCK_NB
     while True:
         file = os.fdopen(os.open(path, os.O_RDWR | os.O_CREAT, 0o666), "r+b")
@@ -132,20 +130,20 @@ def _locked(path: Path, *, wait: bool = False) -> IO[bytes]:
 
 @cache
 def shipped_files(folder: str, suffix: str = ".toml") -> Mapping[str, Path]:
-    """Files of a folder of kinarm's data, such as ``"scenes"``, by name."""
+    """Files of kinarm's data, such as ``"scenes"``, by name."""
     with resources.as_file(resources.files("kinarm.data") / folder) as path:
         return MappingProxyType({file.stem: file for file in sorted(path.glob(f"*{suffix}"))})
 
 
 def named_file(what: str, name: str | Path, others: Iterable[str] = ()) -> Path:
-    """The file of what ships with kinarm, or a path that looks like one.
+    """File of what ships with kinarm, or a path that looks like one.
 
     Parameters
     ----------
     what, name
-        What it holds, such as ``"scene"``, and its name or path.
+        Its kind, such as ``"scene"``, and its name or path.
     others : iterable of str
-        Further names that exist, for the message of UnknownNameError.
+        Further names, for the message of UnknownNameError.
     """
     shipped, path = shipped_files(f"{what}s"), Path(name)
     if str(name) in shipped:
@@ -162,19 +160,19 @@ def absolute(path: str | Path) -> Path:
 
 
 def first_line(error: BaseException) -> str:
-    """Message of an error, in one line; its name if it has none."""
+    """Message of an error in one line; its type's name if empty."""
     return str(error).splitlines()[0] if str(error) else type(error).__name__
 
 
 def check_output(path: str | Path, *, overwrite: bool = False, suffix: str = "") -> None:
-    """See that a file can be written, before any work is done for it; its folder is made.
+    """Make a file's folder, and see that the file can be written, before any work.
 
     Parameters
     ----------
     path, overwrite
         The file, and whether it may exist.
     suffix : str
-        What its name has to end in.
+        Required ending of its name.
     """
     file = Path(path)
     with _reported(path):
@@ -190,7 +188,7 @@ def check_output(path: str | Path, *, overwrite: bool = False, suffix: str = "")
 
 
 def check_folder(folder: str | Path) -> None:
-    """Make a folder if it is missing, and see that files can be written to it."""
+    """Make a missing folder, and see that it can be written to."""
     with _reported(folder, "write to"):
         Path(folder).mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryFile(dir=folder):
@@ -198,7 +196,7 @@ def check_folder(folder: str | Path) -> None:
 
 
 class Archive(NamedTuple):
-    """Arrays of a file by name, and everything else, as JSON holds it."""
+    """Arrays of a file by name, and the rest as JSON."""
 
     header: dict[str, Any]
     arrays: dict[str, NDArray[Any]]
@@ -213,16 +211,16 @@ def save_archive(
     *,
     compress: bool = False,
 ) -> None:
-    """Write a ``.npz`` file whose arrays and header are of some kind, in a version of its format.
+    """Write a ``.npz`` file with arrays and a header.
 
     Parameters
     ----------
     file : str, Path or binary file
         The file.
     kind, version
-        Name of the kind, such as ``"policy"``, and version of the format.
+        What it holds, such as ``"policy"``, and version of the format.
     arrays, header : mapping
-        Arrays by name, and everything else, in terms that JSON can hold.
+        Arrays by name, and the rest for JSON.
     compress : bool
         Whether arrays are compressed.
     """
@@ -252,16 +250,15 @@ def load_archive(
     Parameters
     ----------
     path, kind, version
-        The file, what it has to hold, and the version that it has to have.
+        The file, what it has to hold, and its required version.
     error : type
         Type of the errors.
     unless : tuple of str
-        How the names of arrays begin that are left out.
+        Beginnings of names of arrays to leave out.
     """
     name, wanted = repr(str(path)), f"kinarm-{kind.replace(' ', '-')}"
     with reading(name, kind, error), Path(path).open("rb") as file:
-        is_other = file.read(2) not in (b"", b"PK")
-        content = {} if is_other else _arrays(file, unless)
+        content = _arrays(file, unless) if file.read(2) in (b"", b"PK") else {}
         if "format" not in content:
             raise error(f"{name} is not a kinarm {kind}")
         given = str(content.pop("format"))
@@ -293,14 +290,14 @@ def _arrays(file: IO[bytes], unless: tuple[str, ...]) -> dict[str, NDArray[Any]]
 def reading(
     name: str, kind: str, error: type[KinarmError], *, of: str = "kinarm"
 ) -> Iterator[None]:
-    """Turn what reading a damaged file raises, or making something of it, into one line.
+    """Turn any error of reading a damaged file into one line.
 
     Parameters
     ----------
     name, kind
         Name of the file, quoted, and what it holds.
     error : type
-        Type of the errors; those that have it already pass as they are.
+        Type of the errors; those of this type pass as they are.
     of : str
         Whose file it is.
     """
@@ -315,7 +312,7 @@ def reading(
 
 
 def cache_folder() -> Path:
-    """Folder of the cache: ``$KINARM_CACHE``, or ``kinarm`` in the user's cache folder."""
+    """``$KINARM_CACHE``, or ``kinarm`` in the user's cache folder."""
     users = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
     return Path(os.environ.get(CACHE_VARIABLE) or Path(users) / "kinarm")
 
@@ -325,14 +322,14 @@ def cached_arrays(
 ) -> Arrays:
     """Look arrays up in the cache, or make and keep them.
 
-    A file that cannot be read is replaced; where none can be written, nothing is kept.
+    A damaged file is replaced; what cannot be written is not kept.
 
     Parameters
     ----------
     kind, version
-        What they are, one word; the version is raised when the same content makes other arrays.
+        A word for them; the version is raised when they change.
     made_of : bytes
-        Everything that they depend on.
+        All that they depend on.
     make : callable
         Makes them.
     """

@@ -1,9 +1,8 @@
-"""Requests to end: Ctrl-C and its like end a command in order, in one line and with one status.
+"""Requests to end: Ctrl-C and its like end a command in one line and with one status.
 
-While a command starts, which it does from its first line on, that of this module, there is nothing
-to lose, and it ends at once. While it runs, an `Interruption` is raised; some libraries make
-another error of it, and `was_interrupted` knows of it in any case. Once the command ends, requests
-are ignored. Processes that only import kinarm keep their own ways.
+A command that starts, with this module, ends at once. While it runs, an `Interruption` is raised,
+which `was_interrupted` recognises even where libraries make another error of it. While it ends,
+requests are ignored. Processes that only import kinarm are left alone.
 """
 
 import os
@@ -28,41 +27,41 @@ _requested = False
 class Interruption(KeyboardInterrupt):
     """A request to end.
 
-    After an exact `KeyboardInterrupt` within `exec`, as imports are full of, CPython ends a
-    process by the signal, whatever that returns.
+    An exact `KeyboardInterrupt` within `exec`, as in imports, makes CPython end a process by the
+    signal.
     """
 
 
 def is_command() -> bool:
-    """Whether this process is a command of kinarm: by its script, or by ``python -m kinarm``."""
+    """Whether this process is kinarm's script or ``python -m kinarm``."""
     program = sys.argv[0] if sys.argv else ""
-    if program == "-m":  # so it stands while Python looks for the module, which may be ours
+    if program == "-m":  # while Python looks for the module, which may be ours
         return any(re.fullmatch(r"(-\w*m)?kinarm(\..+)?", word) for word in sys.orig_argv)
     name = os.path.basename(program)  # noqa: PTH119
     return name.partition("-")[0] == "kinarm" and program in sys.orig_argv
 
 
 def _answer(*_: object) -> None:
-    """Answer a request, by the phase in which the command is."""
+    """Answer a request, by the command's phase."""
     global _requested
     if _phase == "starting":
         os._exit(EXIT_STATUS)
     error = sys.exc_info()[1]
     while error is not None and not isinstance(error, Interruption):
         error = error.__context__
-    if _phase == "running" and error is None:  # else one, or what was made of it, is on its way
+    if _phase == "running" and error is None:  # else one is on its way
         _requested = True
         raise Interruption
 
 
 def begin() -> None:
-    """From now on there is something to lose: requests are raised."""
+    """From now on requests are raised."""
     global _phase
     _phase = "running"
 
 
 def end() -> None:
-    """From now on the process ends, and requests are ignored."""
+    """From now on requests are ignored."""
     global _phase
     _phase = "ending"
 
@@ -74,7 +73,7 @@ def was_interrupted(error: BaseException) -> bool:
 
 @contextmanager
 def telling(what_is_left: "Callable[[], str]") -> "Iterator[None]":
-    """Do what can be interrupted; if it is, ``what_is_left`` gives the line that is printed."""
+    """Do what can be interrupted; ``what_is_left`` then gives a line."""
     try:
         yield
     except BaseException as error:
@@ -85,7 +84,7 @@ def telling(what_is_left: "Callable[[], str]") -> "Iterator[None]":
 
 @contextmanager
 def kept_from_children() -> "Iterator[None]":
-    """Processes that are started here never see what a terminal sends to all of its processes."""
+    """Keep what a terminal sends from processes that start here."""
     before = signal.pthread_sigmask(signal.SIG_BLOCK, (signal.SIGINT, signal.SIGHUP))
     try:
         yield

@@ -1,4 +1,4 @@
-"""Running a kernel over the rows of a batch on several threads."""
+"""Kernels over the rows of a batch on several threads."""
 
 import os
 from collections.abc import Callable
@@ -15,25 +15,22 @@ SHARED_STEPS = 2048
 
 def available_threads() -> int:
     """Processors that this process may use."""
-    if hasattr(os, "sched_getaffinity"):
-        return len(os.sched_getaffinity(0))
-    return os.cpu_count() or 1
+    return len(os.sched_getaffinity(0))
 
 
 def run_rows(
     kernel: Callable[..., int | None], n: int, work: int, threads: int, *arrays: Any
 ) -> int:
-    """Call ``kernel(first, last, *arrays)`` for ranges that cover n rows; add up what it returns.
+    """Call ``kernel(first, last, *arrays)`` for ranges that cover n rows; add up the results.
 
-    Kernels release the GIL and treat rows independently, so the result depends neither on the
-    number of threads nor on the ranges.
+    Neither threads nor ranges change results. Kernels release the GIL.
 
     Parameters
     ----------
     kernel, n
         Works on the rows of a range, of so many rows.
     work : int
-        Estimated work [episode steps]; little is done by the calling thread.
+        Estimated work [episode steps]; the calling thread does little alone.
     threads : int
         Threads at most.
     *arrays
@@ -53,11 +50,10 @@ def run_rows(
 def run_together(
     kernel: Callable[..., int], work: int, threads: int, given: Callable[[int], Any], *arrays: Any
 ) -> int:
-    """Call ``kernel(counters, given(thread), *arrays)`` on several threads; add up what it returns.
+    """Call ``kernel(counters, given(thread), *arrays)`` on several threads; add up the results.
 
-    The kernels share out the rows among them by a counter, zero at first, so that none is left
-    with more than the others. The calling thread is one of them, that of number 0. A thread that
-    comes too late is not waited for.
+    By a counter, zero at first, kernels share the rows. The calling thread is number 0. A thread
+    that comes too late is not awaited.
 
     Parameters
     ----------
@@ -66,7 +62,7 @@ def run_together(
     work, threads
         As for `run_rows`.
     given : callable
-        Second argument of the kernel, by the number of the thread.
+        Second argument of the kernel, by thread.
     *arrays
         Passed on to the kernel.
     """
@@ -83,5 +79,5 @@ def run_together(
 
 @cache
 def thread_pool(process: int, threads: int) -> ThreadPoolExecutor:
-    """A pool per process, since threads do not survive a fork."""
+    """A pool per process, since a fork loses threads."""
     return ThreadPoolExecutor(threads, thread_name_prefix=f"kinarm-{process}")

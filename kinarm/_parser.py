@@ -1,4 +1,4 @@
-"""The parser of command lines: help that can be read, one-line errors, version and completion."""
+"""The parser of command lines: help, one-line errors, version and completion."""
 
 import argparse
 import re
@@ -30,13 +30,13 @@ FUNCTIONS: dict[str, Callable[[Iterable[str], str], str]] = {
         "__fish_complete_path (commandline -ct); end"
     ),
 }
-"""Functions of shells that list names and files."""
+"""Shell functions that list names and files."""
 
 
 class Parser(argparse.ArgumentParser):
     """An argument parser that reports bad usage in one line and exits with status 2.
 
-    What its help ends with is a text of ``data/help`` that is called like the command, if any.
+    Its help ends with the text of ``data/help`` with its name, if any.
     """
 
     completable: ClassVar[bool] = True
@@ -63,7 +63,7 @@ class Parser(argparse.ArgumentParser):
     def parse_known_args(  # type: ignore[override]
         self, args: Sequence[str] | None = None, namespace: argparse.Namespace | None = None
     ) -> tuple[argparse.Namespace, list[str]]:
-        """Parse, and refuse what is unknown here: the parser of a command knows its own options."""
+        """Parse, and refuse unknown options."""
         parsed, unknown = super().parse_known_args(args, namespace)
         if unknown:
             given = (word.partition("=")[0] for word in unknown if word.startswith("--"))
@@ -74,7 +74,7 @@ class Parser(argparse.ArgumentParser):
         return parsed, unknown
 
     def add_commands(self, what: str) -> "argparse._SubParsersAction[CommandParser]":
-        """Let the first word be a command, called ``what``, which has options of its own."""
+        """Let the first word be a command, called ``what``, with options."""
         title, metavar = f"{what}s", what.upper()
         return self.add_subparsers(
             title=title, dest=what, required=True, metavar=metavar, parser_class=CommandParser
@@ -85,9 +85,8 @@ class Parser(argparse.ArgumentParser):
         self.exit(2, f"{self.prog}: {one_line(message)} (see {self.prog} --help)\n")
 
     def format_help(self) -> str:
-        """Usage, purpose, then the groups of options; what all commands have comes last."""
-        general = self._optionals
-        self._action_groups.sort(key=lambda group: group is general)
+        """Usage, purpose, then groups of options, the general one last."""
+        self._action_groups.sort(key=lambda group: group is self._optionals)
         end = Path(import_module("kinarm.data").__path__[0], "help", f"{self.prog}.txt")
         if end.is_file():
             self.epilog = end.read_text()
@@ -95,13 +94,13 @@ class Parser(argparse.ArgumentParser):
 
 
 class CommandParser(Parser):
-    """The parser of one of the commands of a program, which leaves completion to the program's."""
+    """The parser of a program's command, without completion."""
 
     completable = False
 
 
 def group_of_options(parser: argparse._ActionsContainer, title: str) -> argparse._ActionsContainer:
-    """The group of a parser with a title, which is made if there is none."""
+    """Group of a parser with a title, made if missing."""
     for group in parser._action_groups:
         if group.title == title:
             return group
@@ -109,10 +108,9 @@ def group_of_options(parser: argparse._ActionsContainer, title: str) -> argparse
 
 
 class HelpFormatter(argparse.HelpFormatter):
-    """Wraps paragraphs, and leaves blocks with lines that are indented as they are.
+    """Wraps paragraphs, but not blocks with indented lines.
 
-    Where an example is too long, all of its block have their meaning on a line of its own. Usage
-    names what has to be given.
+    If an example in a block is too long, their meanings get own lines.
     """
 
     def _format_usage(
@@ -153,7 +151,7 @@ class _PrintCompletion(argparse.Action):
 
 
 def completion_script(parser: argparse.ArgumentParser, shell: str) -> str:
-    """The script with which a shell completes the options that `add_options` added to a parser."""
+    """Script of a shell for options that `add_options` added."""
     import shtab
 
     for action in _actions(parser):
@@ -169,7 +167,7 @@ def completion_script(parser: argparse.ArgumentParser, shell: str) -> str:
 
 
 def _actions(parser: argparse.ArgumentParser) -> Iterator[argparse.Action]:
-    """All options of a parser and of the commands that it has."""
+    """All options of a parser and its commands."""
     for action in parser._actions:
         yield action
         if isinstance(action, argparse._SubParsersAction):
@@ -178,7 +176,7 @@ def _actions(parser: argparse.ArgumentParser) -> Iterator[argparse.Action]:
 
 
 def _names_or_files(shell: str, names: tuple[str, ...]) -> dict[str, Any]:
-    """How a shell completes one of some names, or a file."""
+    """How a shell completes one of some names or a file."""
     call = f"_kinarm_files_or_names_{zlib.crc32(' '.join(names).encode()):08x}"
     return {
         "bash": call,

@@ -31,11 +31,11 @@ class Arm:
     Attributes
     ----------
     specification, description : ArmSpecification and Description
-        What it was made of, and the URDF, reduced to the chain that carries the tool.
+        What it was made of, and the URDF, reduced to the tool's chain.
     model, geometry : pinocchio.Model and pinocchio.GeometryModel
         Kinematics, and collision shapes: primitives, or convex hulls of meshes; no pairs.
     n_actuated : int
-        Joints that actions move: the first ``n_actuated`` ones; the others stay at `home`.
+        Joints, the first ones, that actions move; the others stay at `home`.
     home : ndarray, shape (n_joints,)
         Reference configuration [rad or m].
     allowed_contacts : tuple of AllowedContact
@@ -61,7 +61,7 @@ class Arm:
             array.flags.writeable = False
 
     def __reduce__(self) -> tuple[type, tuple[object, ...]]:
-        # Built anew, copies are read-only, too: kernels are not compiled once more for them.
+        # Built anew, copies are read-only: kernels are not compiled once more for them.
         return type(self), tuple(getattr(self, item.name) for item in fields(self))
 
     @classmethod
@@ -71,8 +71,8 @@ class Arm:
         Parameters
         ----------
         arm : ArmSpecification, str or Path
-            A name of `arm_names`, such as ``"paper"`` or ``"ur5"``, the path of a URDF or of an
-            arm file, or a specification.
+            A name of `arm_names`, such as ``"ur5"``, a path of a URDF or arm file, or a
+            specification.
         **changes
             Fields of `ArmSpecification` to replace.
 
@@ -108,7 +108,7 @@ class Arm:
 
     @property
     def name(self) -> str:
-        """Name of a shipped arm, or of the file without its ending."""
+        """Name of a shipped arm, or stem of the file."""
         return self.specification.name
 
     @property
@@ -169,15 +169,12 @@ class Arm:
 
     @property
     def reach(self) -> float:
-        """Upper bound of the distance from the world's origin to the tool point [m]."""
+        """Bound on the distance from the world's origin to the tool point [m]."""
         return float(link_lengths(self.chain).sum() + np.linalg.norm(self.chain.tool))
 
     @cached_property
     def digest(self) -> str:
-        """Hash of everything that the simulator uses, to tell whether two arms behave alike.
-
-        Where the base stands is no part of it.
-        """
+        """Hash of all that the simulator uses, except where the base stands."""
         if self.unplaced is not None:
             return self.unplaced.digest
         arrays = [*self.chain, self.home, np.array(self.n_actuated)]
@@ -199,8 +196,7 @@ class Arm:
     def tool_position(self, configuration: ArrayLike) -> NDArray[np.float64]:
         """Forward kinematics of the tool point, through Pinocchio.
 
-        Takes a configuration, shape (n_joints,) [rad or m], and returns the tool point in the
-        world frame, shape (3,) [m].
+        Maps a configuration, shape (n_joints,) [rad or m], to the world frame, shape (3,) [m].
         """
         q = finite_array("configuration", configuration, (self.n_joints,))
         data, frame = self.model.createData(), self.model.getFrameId(self.tool_frame, pin.BODY)
@@ -214,7 +210,7 @@ class Arm:
 def _build_model(description: Description, speeds: tuple[float, ...] | None) -> pin.Model:
     """Build the kinematics, with these velocity limits or those of the URDF [rad/s or m/s].
 
-    Raises ArmError if Pinocchio cannot, nothing moves, or a joint has no velocity limit.
+    Raises ArmError if Pinocchio cannot, nothing moves, or a velocity limit is missing.
     """
     name = description.path.name
     try:
@@ -232,7 +228,7 @@ def _build_model(description: Description, speeds: tuple[float, ...] | None) -> 
 
 
 def _robot(description: Description) -> ElementTree.Element:
-    """Pinocchio's input: links with their collision shapes, and joints."""
+    """Pinocchio's input: links, collision shapes and joints."""
     robot = ElementTree.fromstring(description.text)
     robot.attrib = {"name": "robot", "version": "1.2"}
     for parent in (robot, *robot):
@@ -263,7 +259,7 @@ def _build_shapes(description: Description, model: pin.Model) -> pin.GeometryMod
 
 
 def _trailing_idle_axes(model: pin.Model, chain: Chain) -> int:
-    """Count the joints at the end of the chain that pass through the tool point."""
+    """Number of last joints whose axes pass through the tool point."""
     point = chain.tool
     for idle, joint in enumerate(reversed(range(chain.n_joints))):
         offset = np.linalg.norm(np.cross(chain.axis[joint], point))
@@ -276,7 +272,7 @@ def _trailing_idle_axes(model: pin.Model, chain: Chain) -> int:
 def _n_actuated(
     named: tuple[str, ...] | None, model: pin.Model, chain: Chain, description: Description
 ) -> int:
-    """How many joints actions move: those named, which come first, or all that move the tool."""
+    """Number of actuated joints: those named, or all that move the tool."""
     names = list(model.names)[1:]
     if named is None:
         n_actuated = chain.n_joints - _trailing_idle_axes(model, chain)

@@ -1,4 +1,4 @@
-"""Which arm: its name or file and what of it is used, without the libraries that read it."""
+"""Which arm: its name or file and its used parts, without loading it."""
 
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -8,11 +8,11 @@ from kinarm._files import absolute, is_file, shipped_files
 from kinarm.errors import POSITIVE, ArmError
 
 PACKAGE = "example-robot-data:"
-"""Prefix of sources that lie in the installed package of that name."""
+"""Prefix of sources in the installed package of that name."""
 
 
 def arm_names() -> tuple[str, ...]:
-    """Names of the arms that ship with kinarm, or whose package it knows."""
+    """Names of shipped arms, and of those whose package is known."""
     return tuple(shipped_files("arms"))
 
 
@@ -81,7 +81,7 @@ class ArmSpecification(Checked):
     digest: str | None = None
 
     def resolved(self, folder: Path) -> "ArmSpecification":
-        """The same arm with absolute paths; relative ones start at a folder."""
+        """The same arm with absolute paths, from a folder."""
         source, path = self.source, folder / self.source
         is_path = Path(source).suffix in (".urdf", ".toml") or Path(source).parent != Path()
         known = source in arm_names() or source.startswith(PACKAGE)
@@ -91,7 +91,7 @@ class ArmSpecification(Checked):
         return replace(self, source=source, package_dirs=folders)
 
     def completed(self) -> "ArmSpecification":
-        """The same arm with what its arm files say of it; its source is then a URDF."""
+        """The same arm, completed by its files down to a URDF."""
         file = ArmFile.of(self.source)
         if file is None:
             return self
@@ -106,7 +106,7 @@ class ArmSpecification(Checked):
 
     @property
     def name(self) -> str:
-        """Name of a known arm, or of the file without its ending."""
+        """Name of a known arm, or stem of the file."""
         return self.source if self.source in arm_names() else Path(self.source).stem
 
 
@@ -114,8 +114,7 @@ class ArmSpecification(Checked):
 class ArmFile(Checked):
     """An arm file: an arm, and the origin of its data.
 
-    A TOML file with a table ``arm``, the fields of `ArmSpecification`, beside what people want to
-    know.
+    A TOML file whose table ``arm`` has the fields of `ArmSpecification`, with notes for people.
 
     Parameters
     ----------
@@ -138,7 +137,7 @@ class ArmFile(Checked):
 
     @classmethod
     def of(cls, source: str) -> "ArmFile | None":
-        """The arm file of a known arm or of a path; None if the source is a URDF.
+        """Arm file of a known arm or of a path; None if the source is a URDF.
 
         Raises InvalidInputError if it cannot be used, and ArmError if there is none.
         """

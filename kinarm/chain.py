@@ -1,4 +1,4 @@
-"""A serial chain as flat arrays, what the kernels know of an arm; its frames, and motion bounds."""
+"""A serial chain as flat arrays; its frames, and motion bounds."""
 
 from typing import NamedTuple
 
@@ -7,16 +7,16 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 FRAME_KINDS = (pin.FrameType.JOINT, pin.FrameType.BODY, pin.FrameType.FIXED_JOINT)
-"""Kinds of frames; of several with one name, the first kind counts."""
+"""Kinds of frames; the first kind counts for a name."""
 
 
 class Chain(NamedTuple):
-    """Kinematics of n joints in series, in the order base to tool.
+    """Kinematics of n joints in series, from base to tool.
 
     Attributes
     ----------
     prismatic : ndarray of bool, shape (n,)
-        Whether a joint slides; else it turns.
+        Whether a joint slides.
     translation : ndarray, shape (n, 3)
         Origin of a joint frame in its parent joint frame [m].
     rotation : ndarray, shape (n, 4)
@@ -47,7 +47,7 @@ class Chain(NamedTuple):
 
     @classmethod
     def from_model(cls, model: pin.Model, tool_frame: str) -> "Chain":
-        """Extract the arrays from a Pinocchio model of a serial chain and its tool frame."""
+        """Take the arrays from a serial Pinocchio model and its tool frame."""
         frame = model.frames[model.getFrameId(tool_frame, pin.FrameType.BODY)]
         placements = [model.jointPlacements[i] for i in range(1, model.njoints)]
         subspaces = np.array([_motion_subspace(model.joints[i]) for i in range(1, model.njoints)])
@@ -68,21 +68,21 @@ class Chain(NamedTuple):
 
 
 def _motion_subspace(joint: pin.JointModel) -> NDArray[np.float64]:
-    """Direction of a joint's motion in its own frame: linear part, then angular, shape (6,)."""
+    """A joint's motion in its own frame: linear, then angular, shape (6,)."""
     data = joint.createData()
     joint.calc(data, np.zeros(1))
     return np.array(data.S).reshape(6)
 
 
 class Frame(NamedTuple):
-    """A frame that is fixed to a joint.
+    """A frame fixed to a joint.
 
     Attributes
     ----------
     joint : int
-        The joint that carries it: 0 is the world, k the k-th joint.
+        Its joint: 0 is the world, k the k-th joint.
     placement : ndarray, shape (4, 4)
-        Where it is in the joint's frame, as a homogeneous transform [m].
+        Homogeneous transform to the joint's frame [m].
     """
 
     joint: int
@@ -90,7 +90,7 @@ class Frame(NamedTuple):
 
     @classmethod
     def of(cls, frame: pin.Frame) -> "Frame":
-        """Take what counts from a frame of Pinocchio."""
+        """Convert a frame of Pinocchio."""
         return cls(int(frame.parentJoint), np.array(frame.placement.homogeneous, order="C"))
 
 
@@ -108,10 +108,10 @@ class MotionBounds(NamedTuple):
     Attributes
     ----------
     curvature : ndarray, shape (n, n)
-        Bound on the second derivative of the tool point p by two axes [m/rad^2], so that
-        p(q + e) differs from p(q) + J e by at most half the sum of |e_i| |e_j| curvature_ij.
+        Bound on the second derivative of the tool point p by two axes [m/rad^2]: p(q + e) differs
+        from p(q) + J e by at most half the sum of |e_i| |e_j| curvature_ij.
     swing : ndarray, shape (n, n)
-        Bound on how fast a joint (row) moves the origin of a joint frame (column) [m/rad].
+        Bound on the speed of a joint frame's origin (column) by a joint (row) [m/rad].
     length : ndarray, shape (n,)
         Bound on the distance from the origin of a joint frame to the tool point [m].
     """
@@ -124,8 +124,8 @@ class MotionBounds(NamedTuple):
     def of(cls, chain: Chain, n: int) -> "MotionBounds":
         """Bound the motion of a chain whose first n joints move.
 
-        The derivative of a joint's motion by a revolute joint before it is its cross product with
-        that joint, hence no longer than itself; a prismatic joint does not change it.
+        A revolute joint before a joint changes its motion by the cross product of both, which is no
+        longer than the motion; a prismatic joint does not change it.
         """
         origin = np.zeros((1, 3))
         moved = range(n)
@@ -144,7 +144,7 @@ class MotionBounds(NamedTuple):
 
 
 def link_lengths(chain: Chain) -> NDArray[np.float64]:
-    """Bound on the distance from each joint frame's origin to that before it [m], shape (n,)."""
+    """Bound on the distance of each joint's origin from the one before [m], shape (n,)."""
     slide = np.where(chain.prismatic, np.fmax(np.abs(chain.lower), np.abs(chain.upper)), 0.0)
     lengths: NDArray[np.float64] = np.linalg.norm(chain.translation, axis=1) + slide
     return lengths
@@ -153,17 +153,17 @@ def link_lengths(chain: Chain) -> NDArray[np.float64]:
 def point_speed(chain: Chain, axis: int, link: int, points: NDArray[np.float64]) -> float:
     """Bound on the speed of points of a link per unit speed of a joint [m/rad, or m/m].
 
-    A revolute joint moves a point by its distance from the axis. The joint after it starts at a
-    fixed distance from the axis, and the links beyond add at most their lengths.
+    A revolute joint moves a point by its distance from the axis: at most that of the next joint,
+    and the lengths of the links beyond.
 
     Parameters
     ----------
     chain : Chain
         The arm's kinematics.
     axis, link : int
-        The joint, counted from 0, and the link, counted from 1: link k is that of the k-th joint.
+        The joint, from 0, and the link, from 1: link k is that of the k-th joint.
     points : ndarray, shape (n, 3)
-        Points in the link's frame, for whose convex hull the bound holds [m].
+        Points in the link's frame, whose convex hull is bounded [m].
     """
     if chain.prismatic[axis]:
         return 1.0

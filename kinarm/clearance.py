@@ -1,4 +1,4 @@
-"""How far an arm is from touching; how often it touches at random configurations; goals in reach.
+"""Distances from contact, frequencies of contact at random, and goals in reach.
 
 That no configuration is found for a goal proves nothing; the oracle does.
 """
@@ -28,13 +28,12 @@ class Clearance(NamedTuple):
     Attributes
     ----------
     distance : ndarray, shape (...,)
-        How far the closest pair is apart [m]; in contact, zero or less: how far it would have to
-        be moved to come apart. Up to 2e-6 m from contact, Coal's verdict on shapes other than
-        capsules, spheres and the ground may differ.
+        How far the closest pair is apart [m]; in contact, minus the way to come apart. Within
+        2e-6 m of contact, only Coal's verdicts on capsules, spheres and the ground surely agree.
     bodies : ndarray of str, shape (..., 2)
         Names of the two.
     points : ndarray, shape (..., 2, 3)
-        Where they are closest, on each, in the world [m].
+        Closest points on each, in the world [m].
     """
 
     distance: Array
@@ -47,14 +46,14 @@ def measure_clearance(
 ) -> Clearance:
     """Find the closest tested pair of each configuration.
 
-    Compiled code measures capsules, spheres, boxes, convex hulls and the ground, to within 1e-10 m.
-    Coal measures cylinders that may be closest, and shapes that overlap: capsules and spheres if
-    they overlap deeper than their radii, others in any case.
+    Kernels measure capsules, spheres, boxes, convex hulls and the ground, to within 1e-10 m. Coal
+    measures cylinders that may be closest, and overlapping shapes, of capsules and spheres only
+    overlaps deeper than their radii.
 
     Parameters
     ----------
     model, bodies : ContactModel and Bodies
-        An arm in a scene with the pairs that are tested, and its `flattened` geometry.
+        An arm in a scene, and its `flattened` geometry.
     configurations : ndarray, shape (n, n_joints)
         Joint positions [rad or m].
     threads : int
@@ -85,7 +84,7 @@ def measure_clearance(
 
 
 def flattened(geometry: pin.GeometryModel) -> Bodies:
-    """Bodies and pairs of a geometry model, for the kernels."""
+    """Bodies and pairs of a geometry model for the kernels."""
     shapes = list(geometry.geometryObjects)
     corners, rounding = [], []
     for shape in shapes:
@@ -141,7 +140,7 @@ class ContactStatistics:
 
     @classmethod
     def sample(cls, model: ContactModel, count: int = SAMPLES) -> "ContactStatistics":
-        """Ask Coal for every pair, at so many `random_configurations`."""
+        """Ask Coal for every pair, at `random_configurations`."""
         q = random_configurations(model, count)
         data = model.arm.model.createData()
         geometry_data = make_verdicts_reliable(model.geometry.createData())
@@ -156,18 +155,18 @@ class ContactStatistics:
 
     @property
     def free(self) -> NDArray[np.bool_]:
-        """Configurations at which nothing touches, shape (n_samples,)."""
+        """Configurations without contact, shape (n_samples,)."""
         return np.logical_not(self.touching.any(axis=1))
 
     @property
     def shares(self) -> dict[tuple[str, str], float]:
-        """Share of the configurations at which a pair touches, most frequent first."""
+        """Share of configurations at which pairs touch, largest first."""
         shares = self.touching.mean(axis=0)
         order = np.argsort(-shares, kind="stable")
         return {self.pairs[index]: float(shares[index]) for index in order}
 
     def check_movable(self, arm: str) -> None:
-        """Refuse a world in which no configuration is free, by the pair that touches most often."""
+        """Refuse a world that is always in contact."""
         if not self.free.any():
             (pair, share), *_ = self.shares.items()
             raise ProblemError(
@@ -177,14 +176,14 @@ class ContactStatistics:
 
 
 def random_configurations(model: ContactModel, count: int, seed: int = 0) -> Array:
-    """Configurations whose actuated joints are uniform within their limits, shape (n, n_joints).
+    """Configurations, shape (n, n_joints), with actuated joints uniform within their limits.
 
-    The others stay at home.
+    Others stay at home.
 
     Parameters
     ----------
     model, count, seed
-        An arm in a scene, how many, and the seed that they are drawn from.
+        An arm in a scene, their number, and the seed.
     """
     arm, moved = model.arm, slice(model.arm.n_actuated)
     q = np.tile(arm.home, (count, 1))
@@ -194,19 +193,19 @@ def random_configurations(model: ContactModel, count: int, seed: int = 0) -> Arr
 
 
 GOALS, MANY = 100, 0.1
-"""Goals that are looked at, and the share of them that may lack a configuration without a line."""
+"""Goals to look at, and the share that may be missed without a warning."""
 
 
 def find_reachable(world: "World", goals: Array, configurations: int = 50_000) -> NDArray[np.bool_]:
-    """Find out for which goals there is a configuration that touches nothing.
+    """Find out which goals have a configuration without contact.
 
-    One of many random configurations may bring the tool within the tolerance; for the goals that
-    are left, inverse kinematics is asked. An arm that always touches something is refused.
+    Random configurations are tried first, then inverse kinematics. An arm that always touches
+    something is refused.
 
     Parameters
     ----------
     world, configurations
-        Arm and scene, and how many random configurations are tried.
+        Arm and scene, and number of random configurations.
     goals : ndarray, shape (n, 3)
         Goal points [m].
 
@@ -227,7 +226,7 @@ def find_reachable(world: "World", goals: Array, configurations: int = 50_000) -
 
 
 def reach_warning(world: "World") -> str | None:
-    """Say in a line that many of a problem's goals seem out of reach, if they do."""
+    """Say in a line if many of a problem's goals seem out of reach."""
     found = find_reachable(world, world.goals.draw(np.random.default_rng(0), GOALS))
     missed = int((~found).sum())
     if missed <= MANY * GOALS:

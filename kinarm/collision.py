@@ -1,8 +1,7 @@
 """Contact between the arm, the scene and itself: Coal decides, enclosing shapes prove freedom.
 
-`ContactModel` holds one list of pairs twice: as a Pinocchio/Coal geometry model, which decides
-about a configuration, and as flat arrays of enclosing shapes and motion bounds (`ContactShapes`),
-from which the compiled simulator proves that most configurations need no such decision.
+`ContactModel` holds one list of pairs twice: as a Pinocchio/Coal geometry model, which decides, and
+as flat arrays (`ContactShapes`), from which kernels prove most configurations.
 """
 
 import warnings
@@ -23,16 +22,16 @@ from kinarm.errors import ProblemError
 from kinarm.scene import Scene
 
 CLOSE, OFTEN, CLOSENESS_SAMPLES = 0.025, 0.05, 200
-"""A pair is close if it is nearer than this [m] at more than this share of so many samples."""
+"""Close pairs are nearer than this [m] in more than this share of these samples."""
 
 GUESS, HINT = np.array([1.0, 0.0, 0.0]), np.zeros(2, dtype=np.int32)
-"""Where Coal's searches start: direction between two shapes, and numbers of corners."""
+"""Starts of Coal's searches: direction between shapes, and numbers of corners."""
 
 FEW = 4
-"""Of up to so many steps in doubt, Coal also tells what touches."""
+"""Of up to so many steps in doubt, Coal tells what touches."""
 
 MOUNT_SAMPLES = 721
-"""Positions of the first joint at which the mounting is tested."""
+"""Positions of the first joint that test the mounting."""
 
 
 class Contact(NamedTuple):
@@ -41,7 +40,7 @@ class Contact(NamedTuple):
     Attributes
     ----------
     configuration : ndarray, shape (n_joints,)
-        Joint positions at which they do [rad or m].
+        Joint positions [rad or m].
     pair : tuple of str
         Their names.
     point : ndarray, shape (3,)
@@ -57,10 +56,9 @@ class Contact(NamedTuple):
 class ContactModel:
     """An arm in a scene, with the pairs of bodies that are tested for contact.
 
-    Pairs that can tell nothing are left out: neighbours in the chain, bodies that overlap at the
-    home pose, those that the arm's file allows, and the mounting, that is the base and the first
-    link against a world that they never touch or always touch. A configuration is an array of
-    shape (n_joints,) [rad or m].
+    Left out are neighbours in the chain, bodies that overlap at the home pose, those that the arm's
+    file allows, and the mounting: base and first link against a world that they never touch or
+    always touch. A configuration is an array of shape (n_joints,) [rad or m].
 
     Attributes
     ----------
@@ -71,7 +69,7 @@ class ContactModel:
     shapes : ContactShapes
         The same pairs for the kernels.
     left_out : dict
-        Why a pair is left out that moves against each other, by the names of its bodies.
+        Reasons why moving pairs are left out, by the names of bodies.
     """
 
     arm: Arm
@@ -125,9 +123,9 @@ class ContactModel:
 
     @cached_property
     def workspace(self) -> tuple[pin.Data, pin.GeometryData, list[coal.CollisionResult]]:
-        """Space for Pinocchio and Coal, and where the results of each pair lie."""
+        """Data of Pinocchio and Coal, and results of each pair."""
         data = make_verdicts_reliable(self.geometry.createData())
-        # Results are looked at in a list, since wrapping them takes longer than the test itself.
+        # A list, since wrapping results takes longer than the test itself.
         return self.arm.model.createData(), data, list(data.collisionResults)
 
     @cached_property
@@ -139,7 +137,7 @@ class ContactModel:
         )
 
     def in_contact(self, configurations: NDArray[np.float64]) -> NDArray[np.bool_]:
-        """Ask Coal which configurations, shape (n, n_joints), touch something, in one call."""
+        """Ask Coal which configurations, shape (n, n_joints), touch something."""
         if len(configurations) == 0:
             return np.zeros(0, dtype=bool)
         columns = np.asfortranarray(configurations.T)
@@ -152,7 +150,7 @@ class ContactModel:
         return None if index is None else self.pair_names[index]
 
     def contact(self, configuration: NDArray[np.float64]) -> Contact | None:
-        """Describe the first tested pair that is in contact, or return None."""
+        """Describe the first pair in contact, or return None."""
         index = self.first_in_contact(configuration)
         if index is None:
             return None
@@ -174,22 +172,21 @@ class ContactModel:
     def first_contacts(
         self, ways: NDArray[np.float64], doubt: NDArray[np.int64]
     ) -> tuple[NDArray[np.int64], int]:
-        """Find what steps touch first whose kernels have proven them neither free nor in contact.
+        """Find what steps touch first that are proven neither free nor in contact.
 
-        Coal is asked in the order of the motion, and not beyond the first contact.
+        Coal is asked in the order of the motion, up to the first contact.
 
         Parameters
         ----------
         ways : ndarray, shape (n, n_tested, n_joints)
             Configurations in the order of the motion [rad or m].
         doubt : ndarray of int, shape (n,)
-            Bit k set: that of number k, from 0, is in doubt.
+            Bit k set: configuration k, from 0, is in doubt.
 
         Returns
         -------
         touched : ndarray of int, shape (n,)
-            Numbers of the pairs, from 1; -1 where only contact as such is known, 0 where there is
-            none.
+            Numbers of pairs, from 1; -1 for unknown ones, 0 without contact.
         asked : int
             Configurations that Coal was asked about.
         """
@@ -210,14 +207,12 @@ class ContactModel:
 
 
 def make_verdicts_reliable(data: pin.GeometryData) -> pin.GeometryData:
-    """Make verdicts of Coal reliable and a function of the configuration alone; return the data.
+    """Make Coal's verdicts reliable and a function of the configuration alone; return the data.
 
-    By default Coal starts its iteration for convex hulls where the last call on the same pair
-    ended, or at least its search for corners, and verdicts within its tolerance of 1e-6 m then
-    depend on what was asked before. A guess that is given in the request replaces both: the pool
-    leaves it as it is, and `start_anew` puts it back. And unless it is to describe the contact,
-    Coal may stop at a distance of some 1e-7 m and call bodies apart that are centimetres deep in
-    each other, once in some 100 000 times.
+    By default Coal starts where its last call on the same pair ended, and verdicts within its
+    tolerance of 1e-6 m depend on that. A guess in the request, which `start_anew` puts back,
+    replaces it. Without a description of the contact, Coal may stop at a distance of some 1e-7 m
+    and call bodies apart that are centimetres deep in each other, once in some 100 000 times.
     """
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", DeprecationWarning)
@@ -229,7 +224,7 @@ def make_verdicts_reliable(data: pin.GeometryData) -> pin.GeometryData:
 
 
 def start_anew(requests: Iterable[coal.CollisionRequest]) -> None:
-    """Let Coal's next searches start where all do, not where the last ones ended."""
+    """Let Coal's next searches start where all do."""
     for request in requests:
         request.cached_gjk_guess, request.cached_support_func_guess = GUESS, HINT
 
@@ -246,12 +241,12 @@ def _add_scene(geometry: pin.GeometryModel, scene: Scene) -> None:
 
 
 def _links(arm: Arm) -> list[str]:
-    """Link of each collision shape, whose name ends in its number on it."""
+    """Link of each collision shape."""
     return [shape.name.rsplit("_", 1)[0] for shape in arm.geometry.geometryObjects]
 
 
 def body_names(arm: Arm) -> tuple[str, ...]:
-    """Name each collision shape after its link, numbered only where a link has several."""
+    """Links of the collision shapes, numbered only where a link has several."""
     names, links = [shape.name for shape in arm.geometry.geometryObjects], _links(arm)
     return tuple(
         link if links.count(link) == 1 else name for link, name in zip(links, names, strict=True)
@@ -278,16 +273,16 @@ def _candidate_pairs(arm: Arm, geometry: pin.GeometryModel, n_shapes: int) -> li
 def _uninformative_pairs(
     arm: Arm, geometry: pin.GeometryModel, n_shapes: int, names: tuple[str, ...]
 ) -> dict[int, str]:
-    """Pairs within the arm that touch at home, and pairs of the mounting, with the reason.
+    """Pairs within the arm that touch at home, and of the mounting, with reasons.
 
-    The mounting is the first link against the world, where it touches nowhere along the range of
-    the first joint, which is sampled at 721 positions, or the ground everywhere.
+    The mounting is the first link against the world, where it touches never, or the ground always,
+    at 721 positions along the range of the first joint.
     """
     data, geometry_data = arm.model.createData(), make_verdicts_reliable(geometry.createData())
     pairs, objects = list(geometry.collisionPairs), geometry.geometryObjects
 
     def touching(q: NDArray[np.float64], chosen: Iterable[int]) -> set[int]:
-        """Indices, among those of chosen pairs, that are in contact at a configuration."""
+        """Indices of chosen pairs in contact at a configuration."""
         pin.updateGeometryPlacements(arm.model, data, geometry, geometry_data, q)
         start_anew(geometry_data.collisionRequests[index] for index in chosen)
         return {index for index in chosen if pin.computeCollision(geometry, geometry_data, index)}
@@ -320,7 +315,7 @@ def _uninformative_pairs(
 
 
 def _close_pairs(arm: Arm, geometry: pin.GeometryModel) -> set[int]:
-    """Pairs of bodies of which one is a mesh, and that often are less than `CLOSE` apart."""
+    """Pairs with a mesh that often are less than `CLOSE` apart."""
     objects = geometry.geometryObjects
     meshes = [isinstance(shape.geometry, coal.ConvexBase) for shape in objects]
     pairs = [

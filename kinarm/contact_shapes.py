@@ -1,7 +1,4 @@
-"""The shapes that may touch as flat arrays, from which kernels prove freedom from contact.
-
-Polytopes and capsules enclose them.
-"""
+"""Flat arrays of polytopes and capsules around what may touch, for proofs."""
 
 from collections.abc import Collection
 from itertools import product
@@ -24,16 +21,16 @@ BETWEEN_CAPSULES, WITH_BOX, WITH_GROUND = range(3)
 """Kinds of pairs in `ContactShapes.pairs`."""
 
 GROUND = -1
-"""Carrier, in `ContactShapes.planes`, of the plane that is the ground."""
+"""Carrier, in `ContactShapes.planes`, of the ground's plane."""
 
 EXACT = coal.Capsule | coal.Sphere
-"""Shapes that equal the capsule that encloses them."""
+"""Shapes that equal their capsule."""
 
 PLANE = 5
-"""Entries of a separating plane; see `kinarm.kernels.planes`."""
+"""Entries of a separating plane (`kinarm.kernels.planes`)."""
 
 ENCLOSURES = 1
-"""Version, to be raised when the same points are enclosed by something else."""
+"""To be raised when the same points get another enclosure."""
 
 FEW, MANY = 16, 256
 """Corners of a coarse and of a fine polytope about a mesh."""
@@ -46,7 +43,7 @@ SIDES = 32
 
 
 class Enclosure(NamedTuple):
-    """The hull of some corners, shape (n, 3), widened by a radius [m], in the frame of a joint."""
+    """Hull of corners, shape (n, 3), widened by a radius [m], in a joint's frame."""
 
     corners: Array
     rounding: float
@@ -60,9 +57,8 @@ class Enclosure(NamedTuple):
 def enclosing_polytope(shape: pin.GeometryObject, most: int = MANY) -> Enclosure:
     """Rounded polytope of at most so many corners around a shape, in the frame of its joint.
 
-    It equals a capsule, sphere or box. Of a mesh, it is the hull of a few of its vertices, each the
-    farthest one from the hull of those before, widened by the distance of the farthest one left.
-    Other shapes raise ArmError.
+    It equals a capsule, sphere or box. A mesh gets the hull of a few vertices, each the farthest
+    from the hull before, widened by the distance of the farthest left. Others raise ArmError.
     """
     corners, radius = core(shape)
     local = Enclosure(corners, radius)
@@ -74,7 +70,7 @@ def enclosing_polytope(shape: pin.GeometryObject, most: int = MANY) -> Enclosure
 
 
 def core(shape: pin.GeometryObject) -> tuple[Array, float]:
-    """Corners, shape (n, 3), and a radius: widened by it, their hull is or encloses a shape."""
+    """Corners, shape (n, 3), and radius whose widened hull is or encloses a shape."""
     body = shape.geometry
     if isinstance(body, coal.Sphere):
         return np.zeros((1, 3)), float(body.radius)
@@ -97,14 +93,14 @@ def _prism(radius: float, half_length: float) -> Array:
 
 
 def _around(points: Array, most: int) -> Enclosure:
-    """Enclose the hull of points, shape (n, 3); what took long is kept in the cache folder."""
+    """Enclose the hull of points, shape (n, 3), through the cache."""
     made_of = np.int64(most).tobytes() + points.tobytes()
     fitted = cached_arrays("enclosure", ENCLOSURES, made_of, lambda: _fitted(points, most))
     return Enclosure(fitted["corners"], float(fitted["rounding"]))
 
 
 def _fitted(points: Array, most: int) -> dict[str, Any]:
-    """Corners and rounding of what encloses the hull of points."""
+    """Corners and rounding that enclose the hull of points."""
     middle = (points.min(axis=0) + points.max(axis=0)) / 2
     chosen = [int(np.square(points - middle).sum(axis=1).argmax())]
     distances = np.empty(len(points))
@@ -118,10 +114,7 @@ def _fitted(points: Array, most: int) -> dict[str, Any]:
 
 
 def enclosing_capsule(shape: pin.GeometryObject) -> Enclosure:
-    """Capsule around a shape, of two corners, in the frame of its joint.
-
-    It equals a capsule or sphere.
-    """
+    """Capsule around a shape in its joint's frame; equal to a capsule or sphere."""
     corners, radius = core(shape)
     few = len(corners) <= 2
     local = Enclosure(corners[[0, -1]], radius) if few else _capsule_around(corners)
@@ -129,7 +122,7 @@ def enclosing_capsule(shape: pin.GeometryObject) -> Enclosure:
 
 
 def _capsule_around(points: Array) -> Enclosure:
-    """Capsule along the longest principal direction of a set of points, shape (n, 3)."""
+    """Capsule along the main direction of points, shape (n, 3)."""
     centre = (points.min(axis=0) + points.max(axis=0)) / 2
     _, _, directions = np.linalg.svd(points - centre, full_matrices=False)
     direction = directions[0]
@@ -146,41 +139,38 @@ def _capsule_around(points: Array) -> Enclosure:
 class ContactShapes(NamedTuple):
     """Shapes, pairs and motion bounds as flat arrays.
 
-    A *body* is a shape of the arm or, after those, an obstacle, enclosed by a rounded polytope;
-    after those come finer polytopes about shapes whose first one is coarse.
+    A *body* is a rounded polytope about a shape of the arm or, after those, an obstacle; last come
+    finer polytopes about shapes whose first one is coarse.
 
     Attributes
     ----------
     capsules : ndarray, shape (n_shapes, 7)
-        The capsule that is or encloses the shape: its end points (3 + 3) in the joint frame and
-        its radius [m].
+        Capsule that is or encloses the shape: end points (3 + 3) in the joint frame, radius [m].
     boxes : ndarray, shape (n_boxes, 2, 3)
         Lower and upper corners of the obstacles, in the world turned back by their yaw [m].
     pairs : ndarray of int, shape (n_pairs, 3)
-        Kind of the pair, index of a shape, and index of the other shape or box.
+        Kind, index of a shape, and index of the other shape or box.
     travel : ndarray, shape (n_actuated, n_pairs)
-        Bound on how far a joint moves the two bodies of a pair relative to each other
-        [m/rad, or m/m].
+        Bound on how far a joint moves the bodies of a pair relative to each other [m/rad, or m/m].
     exact : ndarray of bool, shape (n_shapes,)
-        Whether the capsule is the shape, rather than encloses it.
+        Whether the capsule equals the shape.
     bodies : ndarray of int, shape (n_bodies, 3)
-        First corner of a body, the one after its last, and the joint frame that carries it: 0 is
-        the world, k the k-th joint.
+        First corner, the one after the last, and joint frame: 0 is the world, k the k-th joint.
     corners : ndarray, shape (n_corners, 3)
         Corners in that frame [m].
     rounding : ndarray, shape (n_bodies,)
-        Radius by which the hull of the corners is widened [m].
+        Radius that widens the hull of the corners [m].
     extents : ndarray, shape (n_bodies, 2, 3)
         Lower and upper ends of the corners [m].
     planes : ndarray of int, shape (n_pairs, 4)
-        Per pair: the body that carries the separating plane, or ``GROUND``; the body that moves
-        against it; the first axis that moves it, and the one after the last.
+        Carrier of the separating plane, or ``GROUND``; mover against it; its first axis, and the
+        one after the last.
     proxies : ndarray of int, shape (n_pairs, 2, 2)
-        Per pair, the bodies that stand for these two: in every step, and where it is close.
+        Bodies that stand for these two: in every step, and where it is close.
     farthest : ndarray, shape (n_actuated,)
         Largest entry of each row of ``travel``.
     turns : ndarray, shape (n_boxes, 2)
-        Cosine and sine of the yaw of the obstacles.
+        Cosine and sine of the obstacles' yaw.
     """
 
     capsules: Array
@@ -213,11 +203,11 @@ class ContactShapes(NamedTuple):
         arm, scene : Arm and Scene
             What may touch.
         pairs : list of tuple
-            Shapes of each pair; obstacles count from ``n_shapes``, and the ground comes last.
+            Shapes of each pair; obstacles count from ``n_shapes``, the ground comes last.
         n_shapes : int
-            Number of the arm's shapes.
+            The arm's shapes.
         close : collection of int
-            Pairs that are mostly so close to each other that coarse polytopes tell nothing.
+            Pairs that mostly are too close for coarse polytopes.
         """
         objects = list(arm.geometry.geometryObjects)
         bodies, links, finer = _enclosed(objects, scene)
@@ -235,7 +225,7 @@ class ContactShapes(NamedTuple):
             proxies.append((fine if column in close else (carrier, mover), fine))
             planes.append((GROUND if ground else carrier, mover, base, last))
             for axis in range(base, last):
-                # Corners of the coarse polytope are among those of the fine one.
+                # The fine polytope has all corners of the coarse one.
                 corners = bodies[finer[mover]].corners
                 travel[axis, column] = point_speed(arm.chain, axis, links[mover], corners)
         return cls(
@@ -262,7 +252,7 @@ class ContactShapes(NamedTuple):
 def _enclosed(
     objects: list[pin.GeometryObject], scene: Scene
 ) -> tuple[list[Enclosure], list[int], list[int]]:
-    """Bodies around shapes and obstacles, the joints that carry them, and each one's finer body."""
+    """Bodies of shapes and obstacles, their joints, and their finer bodies."""
     bodies = [enclosing_polytope(shape, FEW) for shape in objects]
     bodies += [Enclosure(_corners(each), 0.0) for each in scene.obstacles]
     links = [*(shape.parentJoint for shape in objects), *(0 for _ in scene.obstacles)]
@@ -282,7 +272,7 @@ def _corners(obstacle: Obstacle) -> Array:
 
 
 def _turned_back(obstacle: Obstacle) -> Array:
-    """Opposite corners of an obstacle in the world turned back by its yaw, shape (2, 3)."""
+    """Opposite corners of an obstacle, turned back by its yaw, shape (2, 3)."""
     ends = np.array([obstacle.lower, obstacle.upper])
     if not obstacle.yaw:
         return ends
@@ -290,13 +280,13 @@ def _turned_back(obstacle: Obstacle) -> Array:
 
 
 def _turned(points: Array, rotation: Array, about: Array | float = 0.0) -> Array:
-    """Points, shape (n, 3), turned about another one; without BLAS, the same on every machine."""
+    """Points, shape (n, 3), turned without BLAS: the same on every machine."""
     terms = [(points - about)[:, k, None] * rotation[:, k] for k in range(3)]
     return about + terms[0] + terms[1] + terms[2]
 
 
 def _keeps_height(chain: Chain) -> bool:
-    """Whether the first joint is a vertical revolute one, which leaves heights unchanged."""
+    """Whether the first joint turns about the vertical, keeping heights."""
     if chain.prismatic[0]:
         return False
     w, x, y, z = chain.rotation[0]

@@ -1,4 +1,4 @@
-"""Rules, actions and episodes as arrays for the compiled kernels, and what episodes come to."""
+"""Rules, actions and episodes as arrays for kernels, and outcomes."""
 
 from dataclasses import dataclass
 from functools import partial
@@ -17,22 +17,21 @@ RUNNING, PAUSED, SUCCESS, COLLISION, TRUNCATED = range(5)
 LINEAR, TANH, RELU, HARDTANH, ELU, LEAKY_RELU, SILU = range(7)
 """Activation functions of networks."""
 
-
 Outcome = Literal["success", "collision", "truncated"]
-"""How an episode ends: at the goal, in contact, or at the horizon."""
+"""How an episode ends: goal, contact or horizon."""
 
 
 class Rules(NamedTuple):
-    """Task and motion limits as the kernels need them.
+    """Task and motion limits for the kernels.
 
     Attributes
     ----------
     step_limit : ndarray, shape (n_actuated,)
         Largest move of each joint in a step [rad or m].
     tested : int
-        Configurations at which the motion of a step is tested for contact.
+        Configurations of a step that are tested for contact.
     tolerance, horizon
-        Distance at which a goal counts as reached [m], and steps after which episodes end.
+        Distance at which a goal is reached [m], and largest number of steps.
     reward : ndarray, shape (n_terms,)
         Weights of the reward terms.
     """
@@ -45,24 +44,24 @@ class Rules(NamedTuple):
 
 
 class Control(NamedTuple):
-    """Where actions come from: dense networks, or a table if ``layers`` is empty, as by default.
+    """Source of actions: dense networks, or a table if ``layers`` is empty, as by default.
 
     Attributes
     ----------
     layers : ndarray of int, shape (n_layers + 1,)
         Widths, from the observation to the action.
     weights : ndarray, shape (n_policies, n_parameters)
-        Layer after layer, the weights (inputs x outputs) and then the bias.
+        Weights (inputs x outputs), then bias, layer by layer.
     policy : ndarray of int, shape (n_episodes,)
-        Which row of ``weights`` an episode uses.
+        Row of ``weights`` of each episode.
     activations : ndarray of int, shape (n_layers,)
-        Function after each layer; the last one's values are then clipped.
+        Function after each layer; the last one's values are clipped.
     observation_signs, action_signs : ndarray, shape (n_observations,) and (n_actuated,), or (0,)
-        The reflection by which the networks see goals on the left, if they do.
+        Reflection of goals on the left for the networks, if any.
     side : int
-        Entry of the observation that is positive where the goal lies on the left.
+        Entry of the observation that is positive for goals on the left.
     actions : ndarray, shape (n_episodes, n_steps, n_actuated)
-        The table; a table of one step serves every step.
+        The table; one step serves every step.
     """
 
     layers: NDArray[np.int64] = np.zeros(0, dtype=np.int64)
@@ -76,32 +75,31 @@ class Control(NamedTuple):
 
 
 class Episodes(NamedTuple):
-    """State of n episodes; the kernels change it in place.
+    """State of n episodes, which kernels change in place.
 
     Attributes
     ----------
     status, steps, stop : ndarray of int, shape (n,)
-        `RUNNING`, `PAUSED`, `SUCCESS`, `COLLISION` or `TRUNCATED`; steps taken; step count at which
-        to hand an episode back.
+        `RUNNING`, `PAUSED`, `SUCCESS`, `COLLISION` or `TRUNCATED`; steps taken; step at which to
+        hand an episode back.
     q, target : ndarray, shape (n, n_joints)
-        Configuration, and where the step under way leads [rad or m].
+        Configuration, and target of the step under way [rad or m].
     doubt : ndarray of int, shape (n,)
-        Bit k - 1 set: configuration k of the step under way is not proven free.
+        Bit k - 1 set: configuration k of the step is not proven free.
     touched : ndarray of int, shape (n,)
-        Number, from 1, of the pair that refused the last step; 0 if none did, or nobody looked.
+        Number, from 1, of the pair that refused the last step; 0 if none or unknown.
     cleared : ndarray of bool, shape (n,)
         Coal has found the step under way free.
     planes : ndarray, shape (n, n_pairs, PLANE)
-        Separating plane of each pair and the height above it at ``q``; see
-        ``kinarm.kernels.planes``.
+        Separating plane of each pair and height above it at ``q``; see ``kinarm.kernels.planes``.
     goal, distance : ndarray, shape (n, 3) and (n,)
-        Goal position, and distance of the tool from it [m].
+        Goal position, and the tool's distance from it [m].
     observation : ndarray, shape (n, n_observations)
         Observation of the current state.
     terms, total : ndarray, shape (n, n_terms) and (n,)
-        Weighted terms of the last reward, and return: sum of rewards.
+        Weighted terms of the last reward, and sum of rewards.
     moments : ndarray, shape (n, 2, n_observations) or (0, 2, n_observations)
-        Sums of the observations acted upon, less ``shift``, and of their squares.
+        Sums of the observations acted upon, less ``shift``, and their squares.
     shift : ndarray, shape (n_observations,)
         Subtracted before summing, for accuracy.
     path : ndarray, shape (n, horizon + 1, n_joints) or (0, 0, n_joints)
@@ -127,24 +125,23 @@ class Episodes(NamedTuple):
     path: Array
 
     def resume(self, rows: NDArray[np.int64], horizon: int) -> None:
-        """Let episodes go on that success or contact ended; at the horizon they are truncated."""
+        """Let episodes go on after success or contact, up to the horizon."""
         over = self.steps[rows] >= horizon
         self.status[rows] = np.where(over, TRUNCATED, RUNNING)
 
 
 class StepResult(NamedTuple):
-    """Outcome of one step of n episodes, in three tables that the kernel fills in.
+    """Outcome of one step of n episodes, in tables that the kernel fills.
 
     Attributes
     ----------
     numbers : ndarray, shape (2 + n_terms, n)
-        Rewards, distances from the tool to the goal [m], and the weighted terms, in the order of
-        `kinarm.REWARD_TERMS`. Rewards are zero for episodes that were over before.
+        Rewards, distances to the goal [m], and weighted terms, as in `kinarm.REWARD_TERMS`.
+        Rewards are zero for episodes that were over.
     flags : ndarray of bool, shape (3, n)
-        Whether the horizon was reached, the goal, or the step was refused because something
-        touches; all false for episodes that go on or were over before.
+        Truncation, success and refusal by contact; false for episodes that go on or were over.
     contact : ndarray of int, shape (n,)
-        Number, from 1, of the pair that refused the step; 0 if none did, or nobody looked.
+        Number, from 1, of the pair that refused the step; 0 if none or unknown.
     """
 
     numbers: Array
@@ -153,7 +150,7 @@ class StepResult(NamedTuple):
 
     @classmethod
     def empty(cls, n: int) -> "StepResult":
-        """Tables yet to be filled in."""
+        """Empty tables."""
         rows = 2 + len(REWARD_TERMS)
         return cls(np.empty((rows, n)), np.empty((3, n), bool), np.empty(n, np.int64))
 
@@ -202,13 +199,13 @@ class Rollouts:
     starts, goals : ndarray, shape (n, n_joints) and (n, 3)
         Start configurations [rad or m] and goal positions [m].
     success, collision : ndarray of bool, shape (n,)
-        How the episodes ended; neither means that the horizon was reached.
+        How episodes ended; neither means truncation at the horizon.
     steps, distance, returns : ndarray, shape (n,)
-        Steps taken, final distances from the tool to the goal [m], and sums of rewards.
+        Steps taken, final distances to the goal [m], and sums of rewards.
     configurations, targets : ndarray, shape (n, n_joints)
         Final configurations, and where the last step led, which differs if it was refused.
     moments : ndarray, shape (n, 2, n_observations), or empty
-        Sums of the observations acted upon, less the given shift, and of their squares.
+        Sums of the observations acted upon, less the shift, and their squares.
     paths : ndarray, shape (n, horizon + 1, n_joints), or empty
         Configurations visited, NaN after the end.
     """
@@ -227,7 +224,7 @@ class Rollouts:
 
     @classmethod
     def from_episodes(cls, starts: Array, episodes: Episodes, *, copy: bool = False) -> "Rollouts":
-        """Collect the outcome of episodes that have ended; its arrays are read-only.
+        """Collect the outcomes of finished episodes in read-only arrays.
 
         Parameters
         ----------

@@ -1,4 +1,4 @@
-"""Every error that kinarm raises on purpose, and the checks of arguments that raise one.
+"""Errors that kinarm raises on purpose, and checks of arguments that raise them.
 
 ::
 
@@ -10,8 +10,8 @@
     ├── StartInContactError, MissingExtraError
     └── WorkerError, TrainingFailedError
 
-Command lines turn any of them into one line on standard error and exit status 2, or 1 for the last
-two, which are failures of a run.
+Command lines turn them into one line on standard error and exit status 2, or 1 for the last two,
+failures of a run.
 """
 
 import copyreg
@@ -23,10 +23,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 LONGEST = 1500
-"""Characters of a message; of a longer one, the middle is left out."""
+"""Characters of a message; longer ones lose their middle."""
 
 MOST_TRIALS = 10_000_000
-"""Trials of a set at most: memory grows with them."""
+"""Largest number of trials of a set: memory grows with it."""
 
 FROM_ZERO: Mapping[str, Any] = {"at_least": 0}
 TRIALS: Mapping[str, Any] = {"at_most": MOST_TRIALS}
@@ -36,11 +36,11 @@ SHARE = {"must": "lie in [0, 1]", "holds": lambda value: 0 <= value <= 1}
 """Ranges of numbers: metadata of fields."""
 
 LARGEST = 1e6
-"""Numbers of settings at most [m or any unit]; parameters would overflow with larger ones."""
+"""Largest number in settings [m or any unit], against overflows of parameters."""
 
 
 def one_line(text: str) -> str:
-    """A message as one line, without the middle of one that is very long."""
+    """A message as one line, cut in the middle if very long."""
     line = " ".join(text.split())
     if len(line) <= LONGEST:
         return line
@@ -48,7 +48,7 @@ def one_line(text: str) -> str:
 
 
 class KinarmError(Exception):
-    """Base of all errors that kinarm raises on purpose; what they say is one line."""
+    """Base of kinarm's own errors, whose messages are one line."""
 
     exit_status = 2
     """Exit status of a command."""
@@ -57,16 +57,16 @@ class KinarmError(Exception):
         return one_line(super().__str__())
 
     def __reduce__(self) -> tuple[Any, ...]:
-        # Made anew from its message and its attributes, whatever its constructor takes.
+        # Made anew from message and attributes, whatever the constructor takes.
         return copyreg.__newobj__, (type(self), *self.args), vars(self)  # type: ignore[attr-defined]
 
 
 class ArmError(KinarmError):
-    """A robot description is missing, malformed or describes what kinarm cannot simulate."""
+    """A robot description is missing, malformed or not supported."""
 
 
 class ProblemError(KinarmError):
-    """A problem is inconsistent, offers no contact-free start, or is not the one expected."""
+    """A problem is inconsistent, unexpected, or without contact-free starts."""
 
 
 class InvalidInputError(KinarmError, ValueError):
@@ -74,14 +74,14 @@ class InvalidInputError(KinarmError, ValueError):
 
 
 class UnknownNameError(InvalidInputError):
-    """A name that does not exist.
+    """A name does not exist.
 
     Parameters
     ----------
     kind, given : str
-        What was looked up, such as ``"task"``, and the name as given.
+        What was looked up, such as ``"task"``, and the given name.
     available : iterable of str
-        The names that exist.
+        Existing names.
     """
 
     def __init__(self, kind: str, given: str, available: Iterable[str]) -> None:
@@ -106,7 +106,7 @@ class StartInContactError(KinarmError):
 
 
 class PolicyFileError(KinarmError):
-    """A policy file is missing, truncated, foreign, too new, or made for something else."""
+    """A policy file is missing, truncated, foreign, too new, or does not fit."""
 
 
 class RecordingFileError(KinarmError):
@@ -124,12 +124,12 @@ class WorkerError(KinarmError):
 
 
 class TrainingFailedError(KinarmError):
-    """Trainings of an experiment failed; all others are finished.
+    """Trainings of an experiment failed; the others are finished.
 
     Parameters
     ----------
     reasons : mapping of str to str
-        Why they failed, in a line, by their names.
+        Reasons of a line, by the trainings' names.
     trainings : int
         Trainings of the experiment.
     """
@@ -143,12 +143,12 @@ class TrainingFailedError(KinarmError):
 
 
 class MissingExtraError(KinarmError):
-    """An optional package that is not installed.
+    """An optional package is not installed.
 
     Parameters
     ----------
     package, extra : str
-        What is missing, and the extra of kinarm that brings it.
+        What is missing, and kinarm's extra that brings it.
     """
 
     def __init__(self, package: str, extra: str) -> None:
@@ -162,9 +162,9 @@ def finite_array(name: str, value: ArrayLike, shape: tuple[int | None, ...]) -> 
     Parameters
     ----------
     name, value
-        Name of the argument, for messages, and the argument.
+        Name of the argument for messages, and its value.
     shape : tuple
-        Shape that it has to have, in which None stands for any length.
+        Its required shape, with None for any length.
     """
     try:
         array = np.array(value, dtype=np.float64, order="C")
@@ -185,7 +185,7 @@ def finite_array(name: str, value: ArrayLike, shape: tuple[int | None, ...]) -> 
 def one_or_many(
     name: str, value: ArrayLike, shape: tuple[int, ...]
 ) -> tuple[NDArray[np.float64], bool]:
-    """Copy one item of a shape, or n of them, into an array of n; and whether it was one.
+    """Copy one item of a shape, or n of them, into an array of n; tell if it was one.
 
     Parameters
     ----------
@@ -202,12 +202,12 @@ def one_or_many(
 
 
 def whole_number(name: str, value: object, at_least: int, at_most: float = math.inf) -> int:
-    """Return a whole number that is in range, or refuse it.
+    """Return a whole number in a range, or refuse it.
 
     Parameters
     ----------
     name, value
-        Name of the argument, for messages, and the argument.
+        Name of the argument for messages, and its value.
     at_least, at_most : int
         Its range.
     """
@@ -221,18 +221,17 @@ def whole_number(name: str, value: object, at_least: int, at_most: float = math.
 
 
 def check_range(name: str, value: Any, demands: Mapping[str, Any]) -> None:
-    """Refuse numbers that are not finite or break what the metadata of their field demand.
+    """Refuse numbers that are not finite or break demands of their field.
 
     Parameters
     ----------
     name : str
         Name of the field, for messages.
     value : object
-        Its value, in its unit; entries of tuples are looked at one by one, and what is no number
-        passes.
+        Its value, or a tuple of such; anything but numbers passes.
     demands : mapping
-        Metadata of the field. For whole numbers: ``at_least``, 1 if it is not said, and
-        ``at_most``. For other numbers: a condition that ``holds``, and what they ``must`` in words.
+        Metadata of the field. For whole numbers: ``at_least``, 1 by default, and ``at_most``. For
+        others: a condition that ``holds``, and what they ``must`` in words.
     """
     if isinstance(value, tuple):
         for each in value:

@@ -1,8 +1,7 @@
-"""Replay of failed scenarios: episodes of a training that begin where earlier ones failed.
+"""Replay of failed scenarios: training episodes that begin where earlier ones failed.
 
-A policy that reaches most goals meets few scenarios that it can still learn from. A training may
-therefore draw a share of its scenarios from those of the last failed episodes. Its scenarios then
-have another distribution than those of an evaluation, which never replays any.
+A policy that reaches most goals meets few scenarios to learn from. A training may therefore draw a
+share of them from the last failures; evaluations never do.
 """
 
 from collections.abc import Callable
@@ -17,17 +16,15 @@ StartsAndGoals = tuple[NDArray[np.float64], NDArray[np.float64]]
 """Starts, shape (n, n_joints) [rad or m], and goals, shape (n, 3) [m]."""
 
 LARGEST_REPLAY = 1_000_000
-"""Scenarios that can be kept."""
+"""Largest number of kept scenarios."""
 
 
 class FailedScenarios(NamedTuple):
-    """Scenarios of the last episodes that failed, the oldest first.
+    """Scenarios of the last episodes that failed, oldest first.
 
-    A failure is kept for each episode, not for each scenario: one that failed k times among the
-    last ``size`` failures is held k times, and all held ones are replayed with equal chance. So
-    its chance is proportional to its recent failures, without priorities to be estimated and tuned.
-    A mastered scenario adds none, and is forgotten after ``size`` failures of others. Those that
-    always fail are held more and more often, and can displace all others.
+    One that failed k times among the last ``size`` failures is held k times, and all are replayed
+    with equal chance. A mastered one is forgotten after ``size`` failures of others. Those that
+    always fail can displace all others.
 
     Attributes
     ----------
@@ -41,7 +38,7 @@ class FailedScenarios(NamedTuple):
     goals: NDArray[np.float64]
 
     def check(self) -> None:
-        """Refuse starts and goals that are not as many."""
+        """Refuse starts and goals of different numbers."""
         shapes = self.starts.shape, self.goals.shape
         if [len(shape) for shape in shapes] != [2, 2] or len(self.starts) != len(self.goals):
             raise InvalidInputError(f"failed scenarios have the shapes {shapes[0]}, {shapes[1]}")
@@ -54,7 +51,7 @@ class FailedScenarios(NamedTuple):
     def followed_by(
         self, starts: NDArray[np.float64], goals: NDArray[np.float64], size: int
     ) -> "FailedScenarios":
-        """Add newer ones, and forget the oldest but ``size``.
+        """Add newer ones, and keep the last ``size``.
 
         Parameters
         ----------
@@ -76,16 +73,16 @@ class FailedScenarios(NamedTuple):
         Parameters
         ----------
         share, count : float and int
-            Probability that a scenario is one of these, and how many to draw.
+            Probability that a scenario is one of these, and number to draw.
         rng : numpy.random.Generator
-            Decides which of them. It is not asked if none can be.
+            Decides which of them; not asked if none can be.
         draw : callable
-            Draws those that are new, given their places among all, in ascending order.
+            Draws new ones, given their ascending places among all.
 
         Returns
         -------
         tuple
-            Starts and goals, and which are failed ones, an array of bool of shape (count,).
+            Starts and goals, and which failed before, an array of bool of shape (count,).
         """
         every = np.arange(count)
         if not share or not len(self.goals):

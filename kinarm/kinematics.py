@@ -1,4 +1,4 @@
-"""Kinematics of an arm: poses, Jacobians, and configurations that bring the tool to targets."""
+"""Kinematics of an arm: poses, Jacobians, and inverse kinematics."""
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
@@ -24,16 +24,16 @@ from kinarm.kernels.kinematics import follow_frame
 from kinarm.randomness import low_discrepancy_points
 
 ISOLATED_SEPARATION, CONTINUUM_SEPARATION = 1e-3, 0.2
-"""Least difference in some joint of isolated solutions, and of those of a continuum [rad or m]."""
+"""Least difference in some joint of isolated and of other solutions [rad or m]."""
 
 SEEDS, LEAST_SEEDS = 1024, 128
-"""Configurations to begin with: at most, and before a search for isolated solutions may end."""
+"""Seeds: at most, and at least for isolated solutions."""
 
 LOT = 1024
-"""Targets that are solved together."""
+"""Targets solved together."""
 
 ORTHONORMAL = 1e-6
-"""By how much the axes of a wanted pose may miss being orthonormal."""
+"""Deviation from orthonormal axes that a wanted pose may have."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,10 +45,9 @@ class InverseSolutions:
     configurations : ndarray, shape (m, n_joints)
         Target by target, those of one with the smallest largest move first [rad or m].
     owner : ndarray of int, shape (m,)
-        Which target each belongs to.
+        Target of each.
     isolated : bool
-        Whether solutions are isolated, so that these are all; else each target has a continuum of
-        them, over which these are spread.
+        Whether solutions are isolated and complete; else they are spread over a continuum.
     """
 
     configurations: Array
@@ -69,7 +68,7 @@ class InverseSolutions:
 
 
 class Kinematics(ABC):
-    """Kinematics of an arm, compiled; a `World` also tells what the arm touches."""
+    """Compiled kinematics of an arm; a `World` also knows about contact."""
 
     arm: Arm
     threads: int
@@ -80,34 +79,34 @@ class Kinematics(ABC):
 
     @cached_property
     def frames(self) -> dict[str, Frame]:
-        """Frames that `poses` and `jacobians` know, by the names of joints and links."""
+        """Frames of joints and links by name."""
         return find_frames(self.arm.model)
 
     @cached_property
     def tool(self) -> Frame:
-        """The frame with its origin in the tool point and the axes of the arm's tool frame."""
+        """Frame at the tool point with the axes of the arm's tool frame."""
         model = self.arm.model
         return Frame.of(model.frames[model.getFrameId(self.arm.tool_frame, pin.BODY)])
 
     def poses(self, configurations: ArrayLike, frame: str | None = None) -> Array:
-        """Poses of a frame, compiled.
+        """Poses of a frame.
 
         Parameters
         ----------
         configurations : array_like, shape (n_joints,) or (n, n_joints)
             Joint positions [rad or m].
         frame : str, optional
-            Name of a joint or link; the tool, its origin in the tool point, by default.
+            Name of a joint or link; the tool by default, its origin in the tool point.
 
         Returns
         -------
         ndarray, shape (4, 4) or (n, 4, 4)
-            Homogeneous transforms from the frame to the world [m].
+            Homogeneous transforms to the world [m].
         """
         return self._of_frame(configurations, frame, (4, 4))
 
     def jacobians(self, configurations: ArrayLike, frame: str | None = None) -> Array:
-        """Jacobians of a frame: how it moves per unit speed of each joint, compiled.
+        """Jacobians of a frame.
 
         Parameters
         ----------
@@ -118,7 +117,7 @@ class Kinematics(ABC):
         -------
         ndarray, shape (6, n_joints) or (n, 6, n_joints)
             Velocity of the frame's origin, then angular velocity, along the world's axes
-            [m/rad and rad/rad; m/m and 0 of a joint that slides].
+            [m/rad and rad/rad; m/m and 0 of a sliding joint].
         """
         return self._of_frame(configurations, frame, (6, self.arm.n_joints))
 
@@ -150,36 +149,35 @@ class Kinematics(ABC):
     ) -> InverseSolutions:
         """Find all configurations within the limits that bring the tool to positions or poses.
 
-        Damped Newton steps move seeds all over the joints' ranges, to an error of 1e-10
-        of the arm's reach and 1e-10 rad. Solutions are *isolated* if no more joints move than the
-        target has coordinates: 3 of a position, 5 with a direction, 6 of a pose. Each isolated
-        solution is returned once. Else, and at singular configurations, there is a continuum, and
-        the returned solutions are spread over it. The result for a target depends on nothing else.
+        Damped Newton steps move seeds to an error of 1e-10 of the arm's reach and 1e-10 rad.
+        Solutions are *isolated*, and each is returned once, if no more joints move than the target
+        has coordinates: 3 of a position, 5 with a direction, 6 of a pose. Else, and at singular
+        configurations, they are spread over a continuum. Targets do not affect each other.
 
         Parameters
         ----------
         targets : array_like, shape (3,), (n, 3), (4, 4) or (n, 4, 4)
             Positions of the tool point [m], or poses of the tool as `poses` gives them.
         directions : array_like, shape (3,) or (n, 3), optional
-            Directions of the tool's axis at these positions.
+            Directions of the tool's axis.
         near : array_like, shape (n_joints,), optional
-            Solutions nearest to it come first. Of solutions that differ by whole turns, the nearest
-            one is returned. Joints that do not move rest there. Home by default [rad or m].
+            Solutions nearest to it come first; of whole turns the nearest is returned. Joints that
+            do not move rest there. Home by default [rad or m].
         free : bool
             Keep only solutions without contact.
         tool_axis : array_like, shape (3,), optional
-            The tool's axis, in the tool frame; along the last joint's axis and away from the joint
-            before, by default.
+            The tool's axis in the tool frame; by default along the last joint's axis, away from the
+            joint before.
         joints : int, optional
-            How many joints move, counted from the base. By default those that actions move
-            for positions, and all that matter for poses.
+            Number of joints that move, from the base; by default the actuated ones for positions,
+            and all that matter for poses.
         turns : bool
             Give solutions that differ by whole turns one by one.
         most : int
-            Largest number of solutions of a target, before contact and whole turns count.
+            Largest number of solutions of a target, before contact and turns.
         separation : float, optional
-            Least difference of two solutions in some joint; 0.001 if they are isolated, else 0.2
-            by default [rad or m].
+            Least difference of two solutions in some joint; by default 0.001 if they are isolated,
+            else 0.2 [rad or m].
         """
         arm = self.arm
         positions, wanted, axes = self._targets(targets, directions, tool_axis)
@@ -199,7 +197,7 @@ class Kinematics(ABC):
     def _solutions(
         self, search: Search, positions: Array, directions: Array, most: int
     ) -> tuple[Array, NDArray[np.int64]]:
-        """Configurations at positions (n, 3) and directions (n, n_axes, 3), and their targets."""
+        """Solutions, and their targets, at positions (n, 3) and directions (n, n_axes, 3)."""
         n_joints = self.arm.n_joints
         found, counts = [], np.empty(len(positions), dtype=np.int64)
         for first in range(0, len(positions), LOT):
@@ -215,7 +213,7 @@ class Kinematics(ABC):
     def _search(
         self, axes: Array, near: Array, joints: int | None, separation: float | None
     ) -> Search:
-        """Check what is looked for, and complete it; see `Kinematics.inverse_kinematics`."""
+        """Check and complete a search."""
         moved = _moved(self.arm, axes) if joints is None else joints
         moved = whole_number("joints", moved, 1, self.arm.n_joints)
         isolated = moved <= {0: 3, 1: 5, 3: 6}[len(axes)]
@@ -238,7 +236,7 @@ class Kinematics(ABC):
     ) -> tuple[Array, Array, Array]:
         """Positions (n, 3), directions of axes of the tool (n, n_axes, 3), and these (n_axes, 3).
 
-        The axes are those of the last joint frame.
+        The axes are in the last joint frame.
         """
         if np.shape(targets)[-2:] == (4, 4):
             if directions is not None or tool_axis is not None:
@@ -264,12 +262,12 @@ class Kinematics(ABC):
         else:
             given = _units("tool_axis", finite_array("tool_axis", tool_axis, (3,))[None])
             axis = (self.tool.placement[:3, :3] * given).sum(axis=1)
-        # Copied, they can be written to like the others: kernels need not be compiled once more.
+        # Copies are writable like the others: kernels are not compiled once more for them.
         return positions, np.array(along[:, None], order="C"), np.array(axis[None])
 
 
 def _check_poses(poses: Array) -> None:
-    """Refuse matrices that are no homogeneous transforms."""
+    """Refuse matrices that are no poses."""
     turns = poses[:, :3, :3]
     products = (turns[:, :, :, None] * turns[:, :, None, :]).sum(axis=1)
     right = np.abs(products - np.eye(3)).max(axis=(1, 2), initial=0.0) <= ORTHONORMAL
@@ -298,7 +296,7 @@ def _approach(arm: Arm) -> Array:
 
 
 def _moved(arm: Arm, axes: Array) -> int:
-    """Number of joints that move: those of the actions, or those that matter for a pose."""
+    """Number of joints that move: actuated ones, or all that matter for a pose."""
     if len(axes) == 0:
         return arm.n_actuated
     chain = arm.chain
@@ -310,7 +308,7 @@ def _moved(arm: Arm, axes: Array) -> int:
 def _turned(
     arm: Arm, configurations: Array, owner: NDArray[np.int64], moved: int
 ) -> tuple[Array, NDArray[np.int64]]:
-    """Add what differs by whole turns and lies within the limits."""
+    """Add solutions that differ by whole turns within the limits."""
     for joint in np.flatnonzero(~arm.chain.prismatic[:moved]):
         span = int((arm.upper[joint] - arm.lower[joint]) / TURN)
         turns = np.arange(-span, span + 1)

@@ -1,7 +1,4 @@
-"""Mesh files: where they lie, what they hold, and their convex hulls.
-
-A hull has few vertices, and is never smaller than that of the mesh.
-"""
+"""Mesh files: paths, content, and convex hulls, which are never too small."""
 
 import itertools
 import re
@@ -19,14 +16,14 @@ from kinarm.errors import ArmError
 from kinarm.urdf_tree import FARTHEST, parse_xml
 
 FORMATS = (".dae", ".obj", ".stl")
-"""Endings of files that are read."""
+"""Endings of readable files."""
 
 INDEX_TAGS = ("p", "h", "v", "vcount", "int_array")
 NUMBER_TAGS = ("float_array", "matrix", "translate", "rotate", "scale", "skew", "lookat", "color")
-"""Elements of Collada that hold numbers, whole or not."""
+"""Elements of Collada with whole and other numbers."""
 
 COUNTS = ("count", "offset", "stride", "set")
-"""Attributes of Collada that are whole numbers, none of them negative."""
+"""Attributes of Collada that are whole numbers of at least 0."""
 
 INDICES = re.compile(r"\s*(?:-?\d{1,9}(?:\s+|$))*")
 NUMBERS = re.compile(r"\s*(?:[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?(?:\s+|$))*")
@@ -38,32 +35,32 @@ VERSION = 1
 """To be raised when the same mesh gets another hull."""
 
 MANY_VERTICES = 1000
-"""Vertices above which a hull is replaced by a simpler one around it."""
+"""Vertices above which a simpler hull takes its place."""
 
 PLANES = 160
-"""Faces of such a hull at most: it has twice as many vertices less four."""
+"""Faces of such a hull at most; vertices are twice as many less four."""
 
 EXCESS = 1e-4
-"""A corner of it that stands out by less is left as it is [m]."""
+"""Depth of a corner up to which it is not cut off [m]."""
 
 GRID = 1e-9
-"""Normals and offsets are multiples of this [1 and m], so that machines agree on them."""
+"""Unit of normals and offsets [1 and m], so that machines agree."""
 
 
 def resolve_meshes(robot: ElementTree.Element, path: Path, folders: Collection[str]) -> None:
-    """Replace names of meshes in a URDF by paths.
+    """Replace mesh names in a URDF by paths.
 
     Parameters
     ----------
     robot, path
-        Root of the URDF, and its file.
+        Root and file of the URDF.
     folders : collection of str
-        Folders of packages, besides those around the file.
+        Folders of packages, beside those around the file.
 
     Raises
     ------
     ArmError
-        If a mesh is missing that can touch something.
+        If a mesh that can touch something is missing.
     """
     for use in ("collision", "visual"):
         for mesh in robot.findall(f"link/{use}/geometry/mesh"):
@@ -78,7 +75,7 @@ def resolve_meshes(robot: ElementTree.Element, path: Path, folders: Collection[s
 
 
 def _mesh_path(name: str, path: Path, folders: Collection[str]) -> Path | None:
-    """Find a mesh in the package folders, or in one that the URDF lies in."""
+    """Find a mesh in package folders, or around the URDF."""
     scheme, separator, inside = name.partition("://")
     if scheme == "file":
         return Path(inside) if is_file(inside) else None
@@ -93,12 +90,12 @@ def _mesh_path(name: str, path: Path, folders: Collection[str]) -> Path | None:
 
 
 def mesh_content(path: Path) -> bytes:
-    """Read a mesh file, of which nothing is known yet but that it claims no more than it holds.
+    """Read a mesh file; its claims of how much it holds are checked.
 
     Raises
     ------
     ArmError
-        If it does, or cannot be read, or is of another format.
+        If they are false, or the file is unreadable or of another format.
     """
     if path.suffix.lower() not in FORMATS:
         raise ArmError(f"mesh {path.name!r} must be a file of {', '.join(FORMATS)}")
@@ -114,7 +111,7 @@ def mesh_content(path: Path) -> bytes:
 
 
 def _check_collada(content: bytes) -> None:
-    """Refuse a Collada file without numbers where they belong: Assimp hangs or ends the process."""
+    """Refuse a Collada file of bad numbers: Assimp hangs or ends the process."""
     for element in parse_xml(content).iter():
         tag = element.tag.rpartition("}")[2]
         for name in COUNTS:
@@ -127,7 +124,7 @@ def _check_collada(content: bytes) -> None:
 
 
 def check_vertices(path: Path, vertices: NDArray[np.float64]) -> None:
-    """Refuse a mesh whose vertices, shape (n, 3), span no volume or are too far away [m]."""
+    """Refuse vertices, shape (n, 3), without volume or too far away [m]."""
     farthest = np.abs(vertices).max(initial=0.0)
     if not farthest <= FARTHEST:
         raise ArmError(f"mesh {path.name!r} has a vertex {farthest:g} m away")
@@ -137,14 +134,14 @@ def check_vertices(path: Path, vertices: NDArray[np.float64]) -> None:
 
 
 def hull_of_mesh(path: Path, scale: NDArray[np.float64]) -> coal.ConvexBase:
-    """Convex hull of the vertices of a mesh file, or a simpler polytope around many.
+    """Convex hull of a mesh file's vertices, or a simpler polytope around many.
 
-    Its corners are kept in the cache folder. ``scale``, shape (3,), holds factors along its axes.
+    Its corners are cached. ``scale``, shape (3,), holds factors along its axes.
 
     Raises
     ------
     ArmError
-        If the file cannot be read as a mesh.
+        If the file is no readable mesh.
     """
     content = scale.tobytes() + mesh_content(path)
     corners = cached_arrays("hull", VERSION, content, lambda: _corners(path, scale))["corners"]
@@ -154,7 +151,7 @@ def hull_of_mesh(path: Path, scale: NDArray[np.float64]) -> coal.ConvexBase:
 
 
 def _corners(path: Path, scale: NDArray[np.float64]) -> Arrays:
-    """Corners of the hull of a mesh, or of the polytope around it."""
+    """Corners of a mesh's hull, or of a polytope around it."""
     try:
         mesh = coal.MeshLoader(coal.BV_AABB).load(str(path), scale)
         check_vertices(path, mesh.vertices())
@@ -166,10 +163,10 @@ def _corners(path: Path, scale: NDArray[np.float64]) -> Arrays:
 
 
 def enclosing_corners(points: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Corners, at most ``2 * PLANES - 4``, of a polytope around points that span a volume [m].
+    """Corners, at most ``2 * PLANES - 4``, of a polytope around points with a volume [m].
 
-    Faces touch the set. They start with a box and its bevelled corners; then the corner that
-    stands out farthest is cut off, until none does by more than `EXCESS`.
+    Faces touch the points. They begin with a bevelled box; the corner that stands out farthest is
+    cut off until all are within `EXCESS`.
     """
     middle = (points.min(axis=0) + points.max(axis=0)) / 2
     around = points - middle
@@ -200,16 +197,15 @@ def enclosing_corners(points: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def _unit(direction: NDArray[np.float64]) -> NDArray[np.float64]:
-    """A direction of about length one, on the grid."""
+    """Unit direction on the grid, roughly."""
     length = np.sqrt(np.square(direction).sum())
     unit: NDArray[np.float64] = np.round(direction / length / GRID) * GRID
     return unit
 
 
 def _support(points: NDArray[np.float64], normals: NDArray[np.float64]) -> NDArray[np.float64]:
-    """How far points reach along directions at most, rounded up to the grid [m], shape (n,)."""
+    """Reach of points along directions, rounded up to the grid [m], shape (n,)."""
     # Sums without BLAS: the same on every machine.
     x, y, z = points.T
     reach = [(nx * x + ny * y + nz * z).max() for nx, ny, nz in normals]
-    support: NDArray[np.float64] = np.ceil(np.array(reach) / GRID + 1e-3) * GRID
-    return support
+    return np.ceil(np.array(reach) / GRID + 1e-3) * GRID

@@ -1,4 +1,4 @@
-"""Sources of actions for the compiled simulator: batches of dense networks, and tables."""
+"""Dense networks for the compiled simulator."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ class CompiledPolicy(Protocol):
     """A policy that can run inside the compiled simulator."""
 
     def networks(self) -> Networks:
-        """The policy as a batch of one network, its normaliser included."""
+        """The policy and its normaliser as a batch of one network."""
 
 
 ACTIVATIONS: dict[str, Callable[[Array], Array]] = {
@@ -34,7 +34,7 @@ ACTIVATIONS: dict[str, Callable[[Array], Array]] = {
     "leaky_relu": lambda values: np.where(values < 0, LEAK * values, values),
     "silu": lambda values: values * (0.5 + 0.5 * np.tanh(0.5 * values)),
 }
-"""Activation functions by name, as the kernels apply them, in the order of `kinarm.episodes`."""
+"""Activation functions by name, in the order of `kinarm.episodes`."""
 
 Activation = Literal["linear", "tanh", "relu", "hardtanh", "elu", "leaky_relu", "silu"]
 
@@ -53,25 +53,24 @@ class Layer(NamedTuple):
 
 
 class Mirror(NamedTuple):
-    """Signs that the reflection y -> -y gives to the entries of an observation and an action."""
+    """Signs of observations and actions in the reflection y -> -y."""
 
     observations: Array
     actions: Array
 
     def on_the_left(self, observations: Array) -> NDArray[np.bool_]:
-        """Which observations, shape (n, n_observations), have a goal to the left of the arm."""
-        left: NDArray[np.bool_] = observations[:, GOAL_SIDE] > 0
-        return left
+        """Which observations, shape (n, n_observations), have a goal on the left."""
+        return observations[:, GOAL_SIDE] > 0
 
     def from_the_right(self, observations: Array) -> Array:
-        """Reflect those observations, shape (n, n_observations), whose goal lies to the left."""
+        """Reflect observations, shape (n, n_observations), of goals on the left."""
         left = self.on_the_left(observations)
         return np.where(left[:, None], observations * self.observations, observations)
 
     def scenarios_from_the_right(self, starts: Array, goals: Array) -> tuple[Array, Array]:
-        """Reflect those starts, shape (n, n_joints), and goals, shape (n, 3), that lie to the left.
+        """Reflect starts, shape (n, n_joints), and goals, shape (n, 3), on the left.
 
-        Joints that are not actuated stay as they are.
+        Joints that are not actuated stay.
         """
         left = goals[:, 1] > 0
         starts, goals = starts.copy(), goals.copy()
@@ -82,21 +81,20 @@ class Mirror(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Networks:
-    """Dense networks of equal layer widths, whose output is clipped to [-1, 1].
+    """Dense networks of equal widths, with outputs clipped to [-1, 1].
 
     Attributes
     ----------
     layers : ndarray of int, shape (n_layers + 1,)
         Widths, from the observation to the action.
     weights : ndarray, shape (n_networks, n_parameters)
-        Per network, layer after layer: weights (inputs x outputs, row by row), then the bias.
+        Per network and layer, weights (inputs x outputs, row by row), then the bias.
     activations : tuple of str
         Function after each layer, the last one before the clip: ``"linear"``, ``"tanh"``,
         ``"relu"``, ``"hardtanh"``, ``"elu"``, ``"leaky_relu"`` or ``"silu"``; by default tanh
-        between the layers and none after the last.
+        between layers, none after the last.
     mirror : Mirror or None
-        Reflection in which the networks see goals on the left, and act; None if they see all
-        goals as they are.
+        Reflection of goals on the left, and of actions; None for no reflection.
     """
 
     layers: NDArray[np.int64]
@@ -121,14 +119,14 @@ class Networks:
 
     @classmethod
     def linear(cls, matrices: Array, biases: Array) -> Networks:
-        """Linear policies, of maps, shape (n, n_actions, n_observations), and constant parts."""
+        """Linear policies: maps, shape (n, n_actions, n_observations), and biases."""
         n, n_out, n_in = matrices.shape
         flat = matrices.transpose(0, 2, 1).reshape(n, -1)
         return cls(np.array([n_in, n_out]), np.concatenate([flat, biases], axis=1))
 
     @classmethod
     def collect(cls, policies: Networks | CompiledPolicy | Sequence[CompiledPolicy]) -> Networks:
-        """Gather policies into one batch, if their layers, functions and mirror are the same."""
+        """Gather policies of the same layers, functions and mirror."""
         if isinstance(policies, Networks):
             return policies
         if isinstance(policies, CompiledPolicy):
@@ -150,7 +148,7 @@ class Networks:
 
     @property
     def form(self) -> tuple[object, ...]:
-        """Everything but the weights, to compare."""
+        """All but the weights, to compare."""
         signs = () if self.mirror is None else (tuple(part.tolist()) for part in self.mirror)
         return tuple(self.layers.tolist()), self.activations, tuple(signs)
 
@@ -161,16 +159,16 @@ def network_control(
     n: int,
     widths: tuple[int, int],
 ) -> Control:
-    """Arrange the networks of n episodes for the kernels, if they fit.
+    """Arrange the networks of n episodes for the kernels.
 
     Parameters
     ----------
     policies : Networks, policy or sequence of policies
-        One for all episodes, or one for each, or as many as ``policy_index`` chooses from.
+        One for all episodes, one for each, or those of ``policy_index``.
     policy_index : array_like of int, shape (n,), or None
-        Which policy drives which episode.
+        Policy of each episode.
     n, widths
-        Number of episodes, and lengths of an observation and of an action.
+        Number of episodes, and lengths of observation and action.
     """
     networks = Networks.collect(policies)
     given = (int(networks.layers[0]), int(networks.layers[-1]))
@@ -197,13 +195,13 @@ def network_control(
     )
     if networks.mirror is None:
         return control
-    # Copies, which are writable: kernels are compiled anew for arrays that are read-only.
+    # Copies are writable: kernels are compiled anew for read-only arrays.
     signs, action_signs = map(np.array, networks.mirror)
     return control._replace(observation_signs=signs, action_signs=action_signs)
 
 
 def checked_activations(given: Sequence[Activation], n_layers: int) -> tuple[Activation, ...]:
-    """The functions after some layers: those given, or the usual ones if none are."""
+    """Functions after some layers: as given, or the usual ones."""
     for name in given:
         if name not in ACTIVATIONS:
             raise UnknownNameError("activation function", str(name), get_args(Activation))

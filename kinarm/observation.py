@@ -1,7 +1,6 @@
-"""The observation: its parts in one table, each with its formula.
+"""The observation: its parts in a table, each with its formula.
 
-A new part is a function that writes it and an entry of `OBSERVATION`. The kernels, the spaces of
-the environments, the tables of the documentation and the mirror follow from it, and policies of
+A new part is a function that writes it and an entry of `OBSERVATION`; all else follows. Policies of
 another layout are refused.
 """
 
@@ -14,14 +13,14 @@ from numpy.typing import ArrayLike
 from kinarm.kernels.compiling import Array, Vector, inlined
 
 VERSION = 1
-"""To be raised when the meaning of a part changes, but neither its name nor its length."""
+"""To be raised when a part's meaning changes, but not its name and length."""
 
 
 class Ranges(NamedTuple):
-    """Ranges of the entries of an observation, in the problem at hand.
+    """Ranges of the entries of an observation in a problem.
 
-    Corners of a box that holds all goals and the tolerance about them, and a bound on the distance
-    from the world's origin to any point of the arm [m].
+    A box of all goals with tolerance, and a bound on the distance from the world's origin to any
+    point of the arm [m].
     """
 
     goal_lower: Array
@@ -30,20 +29,20 @@ class Ranges(NamedTuple):
 
 
 class Part(NamedTuple):
-    """One part of the observation.
+    """A part of the observation.
 
     Attributes
     ----------
     name, meaning, unit : str
-        Its name in layouts, and what it is, for people.
+        Its name in layouts, and its meaning for people.
     signs : tuple of int
-        Per entry, the sign that the reflection y -> -y gives it; as many as it has entries.
+        Signs of its entries in the reflection y -> -y.
     bounds : callable
-        From `Ranges` to the lowest and the highest values of its entries.
+        From `Ranges` to lowest and highest values of its entries.
     write : callable
         Formula; see `write_goal`.
     per_joint, of_goal : bool
-        Whether there is one for every joint, and whether it depends on the goal.
+        Whether each joint has one, and whether it depends on the goal.
     """
 
     name: str
@@ -56,11 +55,11 @@ class Part(NamedTuple):
     of_goal: bool = False
 
     def length(self, n_joints: int) -> int:
-        """Number of its entries in the observation of an arm."""
+        """Number of its entries for an arm."""
         return len(self.signs) * (n_joints if self.per_joint else 1)
 
     def repeated(self, values: ArrayLike, n_joints: int) -> Array:
-        """Values of its entries, or one for all of them, for every joint that it is of."""
+        """Values of its entries, or one for all, for every joint."""
         once = np.broadcast_to(np.asarray(values, dtype=np.float64), len(self.signs))
         return np.tile(once, self.length(n_joints) // len(self.signs))
 
@@ -78,9 +77,9 @@ def write_goal(
     tool, goals
         The tool point, and goal points, shape (n_episodes, 3), in the world [m].
     e, k : int
-        Episode, and joint from 1; 0 for a part that is not per joint.
+        Episode, and joint from 1; 0 if the part is not per joint.
     observations, start
-        Table, shape (n_episodes, n_observations), and the first entry of the part.
+        Table, shape (n_episodes, n_observations), and the part's first entry.
     """
     for i in range(3):
         observations[e, start + i] = goals[e, i]
@@ -115,7 +114,7 @@ def _write_position(
 
 
 POLAR = (1, -1, 1)
-"""Signs that the reflection y -> -y gives to the entries of a vector."""
+"""Signs of a vector in the reflection y -> -y."""
 
 OBSERVATION = (
     Part(
@@ -155,26 +154,26 @@ OBSERVATION = (
         per_joint=True,
     ),
 )
-"""The parts in their order; those that are per joint go through all joints before the next."""
+"""The parts in order; those per joint go through all joints in turn."""
 
 
 GOAL_SIDE = 1
-"""Entry that tells on which side of the arm the goal lies: its y, positive on the left [m]."""
+"""Entry of the goal's y, which is positive on the left [m]."""
 
 
 def observation_size(n_joints: int) -> int:
-    """Length of the observation of an arm."""
+    """Length of an arm's observation."""
     return sum(part.length(n_joints) for part in OBSERVATION)
 
 
 def observation_layout() -> str:
-    """Names and lengths of the parts, to tell whether a policy understands them."""
+    """Names and lengths of the parts, to compare."""
     parts = (f"{part.name} {len(part.signs)}{'n' * part.per_joint}" for part in OBSERVATION)
     return f"{VERSION}: {', '.join(parts)}"
 
 
 def observation_signs(n_joints: int) -> Array:
-    """Signs that the reflection y -> -y gives to the entries, shape (n_observations,)."""
+    """Signs of entries in the reflection y -> -y, shape (n_observations,)."""
     return np.concatenate([part.repeated(part.signs, n_joints) for part in OBSERVATION])
 
 
@@ -189,7 +188,7 @@ def observation_bounds(ranges: Ranges, n_joints: int) -> tuple[Array, Array]:
 
 
 def part_slices(n_joints: int) -> dict[str, slice]:
-    """Where each part lies in the observation of an arm, by its name."""
+    """Place of each part in an arm's observation, by name."""
     ends = np.cumsum([part.length(n_joints) for part in OBSERVATION]).tolist()
     return {
         part.name: slice(end - part.length(n_joints), end)
@@ -198,7 +197,7 @@ def part_slices(n_joints: int) -> dict[str, slice]:
 
 
 def _compose(parts: Sequence[Part]) -> Any:
-    """Join the formulas of parts into one kernel, which Numba inlines."""
+    """Join the formulas of parts into one kernel, inlined by Numba."""
     write, length, per_joint = parts[0].write, len(parts[0].signs), parts[0].per_joint
     write_others = _compose(parts[1:]) if len(parts) > 1 else _write_nothing
 
@@ -226,4 +225,4 @@ def _write_nothing(
 
 
 write_observation = _compose(OBSERVATION)
-"""Kernel that writes a row of observations: poses, tool, goals, row, observations, first entry."""
+"""Kernel that writes a row of observations, from its first entry."""

@@ -1,8 +1,7 @@
 """The problem: an arm, a scene, a task and a stepping, as one value.
 
-Everything that simulates, trains, bounds, evaluates, records or stores takes a problem and names
-it. What cannot be used is refused by a `KinarmError`, in one line that names it. Problems, scenes
-and tasks also lie in files: those that ship with kinarm, and the user's own.
+What cannot be used is a `KinarmError` of one line. Problems, scenes and tasks also lie in files,
+shipped or the user's.
 """
 
 import hashlib
@@ -28,7 +27,7 @@ if TYPE_CHECKING:
 Part = TypeVar("Part", Scene, ReachTask)
 
 PAPER_TASKS = {"left": ("left",), "right": ("right",), "both": ("left", "right")}
-"""Goal regions of the paper's tasks 1, 2 and 3 by the names of their problems."""
+"""Goal regions of the paper's tasks 1, 2 and 3 by problem."""
 
 KEYS = {"base", "name", "arm", "scene", "task", "stepping"}
 """Keys of a problem file."""
@@ -83,9 +82,8 @@ class ReachProblem(Checked):
         Parameters
         ----------
         problem : str, Path, mapping or ReachProblem
-            ``"left"``, ``"right"`` or ``"both"``, the paper's tasks 1, 2 and 3, or another name of
-            `problem_names`; the path of a TOML file; what `to_json` returned; or a problem, which
-            is returned as it is.
+            ``"left"``, ``"right"`` or ``"both"``, the paper's tasks 1, 2 and 3, or another of
+            `problem_names`; the path of a TOML file; what `to_json` returned; or a problem.
         """
         if isinstance(problem, ReachProblem):
             return problem
@@ -98,16 +96,16 @@ class ReachProblem(Checked):
         return replace(read, arm=read.arm.resolved(absolute(path).parent))
 
     def replace(self, **overrides: Any) -> "ReachProblem":
-        """Change some parts of it.
+        """Change parts of it.
 
         Parameters
         ----------
         **overrides
             ``name``; ``arm`` (a name, a path or a specification), ``scene`` and ``task`` (by
-            name, of a file, of another problem, or as they are), ``stepping``; ``reward``
-            (weights, or a mapping of those that change); or any field of the task or of the
-            stepping, such as ``tolerance``. None leaves what there is. In a scene, by name or
-            file, that lacks a goal region of the task, all regions are to be reached.
+            name, of a file, of another problem, or themselves), ``stepping``; ``reward``
+            (weights, or a mapping of those that change); or any field of the task or the
+            stepping, such as ``tolerance``. None changes nothing. With another scene, by name or
+            file, that lacks a goal region of the task, all its regions are to be reached.
         """
         given = {name: value for name, value in overrides.items() if value is not None}
         if not given:
@@ -151,21 +149,21 @@ class ReachProblem(Checked):
 
     @property
     def pinned(self) -> "ReachProblem":
-        """The same problem, whose arm must have the hash that it has now."""
+        """The same problem, whose arm must have its present hash."""
         return self.replace(arm=replace(self.arm, digest=self.arm_digest))
 
     @cached_property
     def digest(self) -> str:
-        """Hash of everything that behaviour depends on; the name is not part of it."""
+        """Hash of all that behaviour depends on, without the name."""
         entries = {**self.to_json(), "arm": self.arm_digest}
         del entries["name"]
         text = json.dumps(entries, sort_keys=True)
         return hashlib.sha256(text.encode()).hexdigest()[:16]
 
     def first_difference(self, other: "ReachProblem") -> str | None:
-        """Say where another problem first differs in what behaviour depends on; None if nowhere.
+        """Say where behaviour first depends on another value in another problem.
 
-        Such as ``"task.tolerance is 0.03, not 0.05"``, with the own value last.
+        Such as ``"task.tolerance is 0.03, not 0.05"``, own value last; None if nowhere.
         """
         if other is self:
             return None
@@ -184,32 +182,29 @@ class ReachProblem(Checked):
         return self.arm_digest == other.arm_digest and self.scene == other.scene
 
     def covers(self, other: "ReachProblem") -> bool:
-        """Whether this is the other problem, or that with further goal regions.
-
-        How often each region is drawn makes no difference.
-        """
+        """Whether this is the other problem with any goal weights and further regions."""
         wider = set(self.task.goal_regions) >= set(other.task.goal_regions)
         goals = {"goal_regions": other.task.goal_regions, "goal_weights": other.task.goal_weights}
         return wider and self.replace(**goals).first_difference(other) is None
 
     def check_same(self, other: "ReachProblem", what: str) -> None:
-        """Refuse another problem, which is that of ``what``, by the first field that differs."""
+        """Refuse another problem, that of ``what``, by the first difference."""
         difference = self.first_difference(other)
         if difference is not None:
             raise ProblemError(f"{what} is of another problem: {difference}")
 
     def to_json(self) -> dict[str, Any]:
-        """As a dictionary that JSON can hold; `from_json` reads it without loss."""
+        """As a dictionary for JSON, without loss."""
         entries: dict[str, Any] = to_plain(self)
         return entries
 
     @classmethod
     def from_json(cls, entries: object, where: str = "problem") -> "ReachProblem":
-        """Rebuild what `to_json` returned; errors name ``where`` it is from."""
+        """Rebuild what `to_json` returned; errors name ``where``."""
         return from_plain(cls, entries, where)
 
     def to_toml(self) -> str:
-        """As the text of a problem file; `load` reads it without loss."""
+        """As text of a problem file, without loss."""
         return tomli_w.dumps(self.to_json())
 
     def save(self, path: str | Path) -> None:
@@ -218,7 +213,7 @@ class ReachProblem(Checked):
 
 
 ProblemLike = ReachProblem | str | Path | Mapping[str, Any]
-"""A problem, its name, the path of its file, or what `ReachProblem.to_json` returned."""
+"""A problem, its name or file, or what `ReachProblem.to_json` returned."""
 
 PROBLEMS = {
     name: ReachProblem(name=name, task=ReachTask(goal_regions=regions))
@@ -247,7 +242,7 @@ def _check_names(what: str, given: Mapping[str, Any], *kinds: type) -> None:
 
 
 def _leaves(value: Any, path: str = "") -> Iterator[tuple[str, Any]]:
-    """Values of nested tables and lists with their paths, such as ``scene.obstacles[0].name``."""
+    """Values of nested tables by paths, such as ``scene.obstacles[0].name``."""
     if isinstance(value, Mapping):
         for key, entry in value.items():
             yield from _leaves(entry, f"{path}.{key}" if path else key)
@@ -259,21 +254,20 @@ def _leaves(value: Any, path: str = "") -> Iterator[tuple[str, Any]]:
 
 
 def problem_names() -> tuple[str, ...]:
-    """Names of the problems that ship with kinarm."""
+    """Names of the shipped problems."""
     return (*PAPER_TASKS, *shipped_files("problems"))
 
 
 def scene_names() -> tuple[str, ...]:
-    """Names of the scenes that ship with kinarm."""
+    """Names of the shipped scenes."""
     return tuple(shipped_files("scenes"))
 
 
 def read_problem(path: Path) -> dict[str, Any]:
-    """Read a problem file, as a table of what differs from the defaults of a problem.
+    """Read a problem file, as a table of what differs from the defaults.
 
-    Its parts are tables; ``arm``, ``scene`` and ``task`` may also be names or files. What is left
-    out is that of the problem ``base``. Without a word on goal regions, another scene's are all
-    to be reached.
+    Parts are tables; ``arm``, ``scene`` and ``task`` may also be names or files. The problem
+    ``base`` has the rest. By default all goal regions of another scene are to be reached.
     """
     entries = read_toml(path, "problem")
     regions = PAPER_TASKS[take_base(entries, str(path), PAPER_TASKS, "right")]
@@ -291,12 +285,12 @@ def read_problem(path: Path) -> dict[str, Any]:
 
 
 def find_scene(name: str | Path) -> Scene:
-    """Find a scene by its name, by the name of a problem, or in a file of either."""
+    """Find a scene by its name, that of a problem, or a file of either."""
     return _find_part(Scene, "scene", name)
 
 
 def find_task(name: str | Path) -> ReachTask:
-    """Find a task: by the name of a problem that has it, or in a file of task or problem."""
+    """Find a task by the name of a problem, or in a file of task or problem."""
     if str(name) in PAPER_TASKS:
         return ReachTask(goal_regions=PAPER_TASKS[str(name)])
     return _find_part(ReachTask, "task", name)
@@ -324,6 +318,6 @@ def _find_part(kind: type[Part], what: str, name: str | Path) -> Part:
 
 
 def _beside(path: Path, name: str) -> str | Path:
-    """Another file by its name, or by its path from the folder of the file that names it."""
+    """A name, or a path from the folder of the file that names it."""
     beside = path.parent / name
     return beside if is_file(beside) else name

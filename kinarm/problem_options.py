@@ -57,7 +57,7 @@ class ProblemOptions(Checked):
             *("tolerance", "horizon", "start_spread"),
         )
     }
-    """Fields by the title of the group of options that they are in."""
+    """Fields by the titles of groups."""
 
     DEFAULTS: ClassVar[Mapping[str, str]] = {
         **dict.fromkeys(
@@ -68,7 +68,7 @@ class ProblemOptions(Checked):
     """Values without an option, in words."""
 
     def resolve(self, default: ProblemLike = "right") -> ReachProblem:
-        """The problem that the options make of a default one."""
+        """The problem that the options make of a default."""
         changed = {name: getattr(self, name) for name in init_fields(ProblemOptions)}
         named = changed.pop("problem")
         if named is None and self.task is not None:
@@ -79,8 +79,8 @@ class ProblemOptions(Checked):
         return problem.replace(arm=self._arm(problem), **changed)
 
     def _arm(self, problem: ReachProblem) -> "Arm | None":
-        """The arm that the options name or change; None if they do neither."""
-        from kinarm.arm import Arm  # loads Pinocchio: --help does without
+        """The arm that the options name or change, or None."""
+        from kinarm.arm import Arm  # loads Pinocchio, unlike --help
 
         given = {"tool_frame": self.tool_frame, "package_dirs": self.package_dirs or None}
         given = {name: value for name, value in given.items() if value is not None}
@@ -90,7 +90,7 @@ class ProblemOptions(Checked):
 
 
 def say_choices(problems: Iterable[ReachProblem]) -> None:
-    """Say on standard error what was chosen where a URDF says nothing, a line for each arm."""
+    """Say on standard error what was chosen for URDFs, a line per arm."""
     for specification in dict.fromkeys(problem.arm for problem in problems):
         if specification.source not in arm_names():
             from kinarm.arm import Arm

@@ -1,8 +1,8 @@
-"""Random generators by purpose: no two purposes share numbers, for any seeds; and even points.
+"""Random generators by purpose, which never share numbers; and even points.
 
-A generator's key is the hash of the purpose's name, followed by numbers of its own. The trials of
-an evaluation (``kinarm.evaluation.trials.trial_generator``) are older than the names: their keys
-have two numbers and are therefore other keys than those, which have four at least.
+A generator's key is the hash of its purpose's name, four numbers, and then numbers of its own.
+Trials of an evaluation (``kinarm.evaluation.trials.trial_generator``) are older: their keys have
+two.
 """
 
 import hashlib
@@ -31,7 +31,7 @@ def stream_generator(stream: Stream, seed: int, *numbers: int) -> np.random.Gene
     stream, seed
         The purpose, and the seed of the whole, from 0.
     *numbers : int
-        Which of the generators of this purpose, such as the iteration; from 0.
+        Which generator of this purpose, such as the iteration; from 0.
     """
     name = np.frombuffer(hashlib.sha256(stream.encode()).digest()[:16], dtype="<u4")
     key = (*map(int, name), *numbers)
@@ -41,12 +41,11 @@ def stream_generator(stream: Stream, seed: int, *numbers: int) -> np.random.Gene
 def low_discrepancy_points(count: int, dimensions: int) -> NDArray[np.float64]:
     """Points that fill the unit cube evenly, shape (count, dimensions).
 
-    They are multiples of powers of a root, modulo 1. The root solves x^(d + 1) = x + 1, which for
-    d = 1 is the golden ratio (Roberts 2018).
+    They are multiples of powers of a root of x^(d + 1) = x + 1, modulo 1; for d = 1, of the golden
+    ratio (Roberts 2018).
     """
     root = 2.0
     for _ in range(64):
         root = (1.0 + root) ** (1.0 / (dimensions + 1))
     strides = root ** -np.arange(1.0, dimensions + 1)
-    points: NDArray[np.float64] = (0.5 + np.arange(1, count + 1)[:, None] * strides) % 1.0
-    return points
+    return (0.5 + np.arange(1, count + 1)[:, None] * strides) % 1.0

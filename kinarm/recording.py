@@ -1,4 +1,4 @@
-"""Recordings: what an arm did in one trial or along a path, state by state, without pickle."""
+"""Recordings: what an arm did in a trial or along a path, without pickle."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -25,17 +25,17 @@ from kinarm.world import World
 KIND, FORMAT_VERSION = "recording", 2
 OUTCOMES = get_args(Outcome)
 ARRAYS = ("states", "distances", "goal", "refused", "contact_point")
-"""Fields of a `Recording` that are stored as arrays."""
+"""Array fields of a `Recording`."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Recording:
-    """The motion of an arm in one trial, and its end. Arrays are copied and read-only.
+    """The motion of an arm in one trial. Arrays are copied and read-only.
 
     Parameters
     ----------
     policy, problem
-        Name of what drove the arm, and what was faced, with the hash of its arm.
+        Name of what drove the arm, and the problem, with its arm's hash.
     trial : int
         Number of the trial in its set.
     states : ndarray, shape (steps + 1, n_joints)
@@ -49,16 +49,16 @@ class Recording:
     contact, contact_point : tuple of str and ndarray, shape (3,), optional
         The two bodies that would have touched, and where [m], if the last move was refused.
     refused : ndarray, shape (n_joints,), optional
-        The first configuration of the refused move at which they touch [rad or m].
+        Configuration of the refused move at which they touch first [rad or m].
     steps_lower_bound : int, optional
         Proven: no motion reaches the goal in fewer steps.
     provenance : dict
-        Where it comes from, in terms that JSON can hold.
+        Where it comes from, for JSON.
 
     Raises
     ------
     InvalidInputError
-        If shapes do not fit together, an entry is not finite or the outcome is unknown.
+        If shapes do not match, an entry is not finite or the outcome is unknown.
     """
 
     policy: str
@@ -114,12 +114,12 @@ class Recording:
         return same_goal and np.array_equal(self.states[0], other.states[0])
 
     def save(self, path: str | Path) -> None:
-        """Write this recording alone to an ``.npz`` file; see `save_recordings`."""
+        """Write it alone to an ``.npz`` file; see `save_recordings`."""
         save_recordings(path, [self])
 
     @classmethod
     def load(cls, path: str | Path) -> "Recording":
-        """Read the recording of a file that holds one; see `load_recordings`."""
+        """Read the only recording of a file; see `load_recordings`."""
         recordings = load_recordings(path)
         if len(recordings) != 1:
             raise RecordingFileError(
@@ -129,12 +129,12 @@ class Recording:
 
 
 def save_recordings(path: str | Path, recordings: Sequence[Recording]) -> None:
-    """Write recordings to an ``.npz`` file, without pickle.
+    """Write recordings to an ``.npz`` file.
 
     Raises
     ------
     OutputError
-        If the file cannot be written; an existing file is then left as it was.
+        If the file cannot be written; an existing one then stays as it was.
     """
     problems = list(dict.fromkeys(each.problem for each in recordings))
     entries, arrays = [], {}
@@ -154,7 +154,7 @@ def load_recordings(path: str | Path) -> list[Recording]:
     Raises
     ------
     RecordingFileError
-        If the file is missing, truncated, something else, or written by another version.
+        If the file is missing, damaged, something else, or of another version.
     """
     archive = load_archive(path, KIND, FORMAT_VERSION, RecordingFileError)
     with reading(repr(str(path)), KIND, RecordingFileError):
@@ -183,20 +183,20 @@ def record_rollouts(
     Parameters
     ----------
     simulator, rollouts
-        Where the rollouts took place, and these, made with ``record=True``.
+        Simulator of the rollouts, which were made with ``record=True``.
     policy : str
         Name of what drove the arm.
     numbers : sequence of int, optional
-        Which rollouts; all by default. A rollout's number becomes that of the trial.
+        Which rollouts; all by default. It becomes the number of the trial.
     steps_lower_bound : callable, optional
         Gives the proven number of steps of a trial, or None.
     provenance : dict, optional
-        Where they come from, in terms that JSON can hold.
+        Where they come from, for JSON.
 
     Raises
     ------
     InvalidInputError
-        If the rollouts were made without ``record=True``, or have no such number.
+        If the rollouts were made without ``record=True``, or lack a number.
     """
     if rollouts.paths.size == 0:
         raise InvalidInputError("these rollouts kept no configurations: make them with record=True")
@@ -236,22 +236,22 @@ def record_path(
     goal: ArrayLike | None = None,
     name: str = "path",
 ) -> Recording:
-    """Record what an arm does that is to follow a path.
+    """Record what an arm does on a path.
 
-    From each configuration it moves straight to the next one, as fast as its joints allow and in
-    at least a step. All joints move, whether or not actions move them. The motion is tested for
-    contact as in the simulator; a step that touches something is refused and the last one.
+    It moves straight to each next configuration, as fast as its joints allow and in at least a
+    step. All joints move, whether actuated or not. A step that touches something is refused and is
+    the last.
 
     Parameters
     ----------
     problem : World, ReachProblem, str or Path
-        Arm, scene and time step; a horizon that is too short for the path is made longer.
+        Arm, scene and time step; a short horizon is extended.
     path : array_like, shape (n, n_joints)
-        At least one configuration, all within the limits [rad or m].
+        One or more configurations within the limits [rad or m].
     goal : array_like, shape (3,), optional
-        Goal position, the tool point at the end of the path by default [m].
+        Goal position; the tool point at the path's end by default [m].
     name : str
-        How the recording calls what drove the arm.
+        What the recording calls its policy.
 
     Raises
     ------
@@ -305,7 +305,7 @@ def _within_limits(world: World, path: ArrayLike) -> NDArray[np.float64]:
 
 
 def _stepwise(world: World, points: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Configurations at the ends of all steps along a path, its start included."""
+    """Configurations at the ends of steps along a path, start included."""
     limit = world.arm.velocity_limits * world.problem.stepping.time_step
     parts = [points[:1]]
     for here, there in pairwise(points):

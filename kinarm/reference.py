@@ -1,7 +1,7 @@
-"""The slow reference: the simulator's semantics in plain Pinocchio and Coal, one step at a time.
+"""The slow reference: the simulator's semantics in plain Pinocchio and Coal, step by step.
 
 It shares no kernel with `kinarm.simulator` and asks Coal about every tested configuration. Tests
-and ``kinarm-bench`` hold the compiled rollouts against it.
+and ``kinarm-bench`` compare with it.
 """
 
 from collections.abc import Callable
@@ -23,13 +23,13 @@ class ReferenceEpisode(NamedTuple):
     Attributes
     ----------
     path, observations : ndarray, shape (steps + 1, n_joints) and (steps + 1, n_observations)
-        Configurations visited [rad or m], and observations of them.
+        Configurations visited [rad or m], and their observations.
     rewards : ndarray, shape (steps,)
         Rewards.
     success, collision : bool
-        How it ended; neither means that the horizon was reached.
+        How it ended; neither means truncation at the horizon.
     distance, contact
-        Final distance from the tool to the goal [m], and the first pair in contact, if any.
+        The tool's final distance from the goal [m], and the first pair in contact, if any.
     """
 
     path: Array
@@ -42,7 +42,7 @@ class ReferenceEpisode(NamedTuple):
 
 
 class ReferenceSimulator:
-    """Steps one episode at a time with Pinocchio's kinematics and Coal's verdict."""
+    """Steps single episodes with Pinocchio and Coal."""
 
     def __init__(self, simulator: Simulator) -> None:
         self.arm: Arm = simulator.arm
@@ -101,7 +101,7 @@ class ReferenceSimulator:
         )
 
     def observe(self, q: Array, goal: Array) -> tuple[Array, float]:
-        """Observation of a configuration and its distance to the goal [m]."""
+        """Observation of a configuration and the distance to the goal [m]."""
         model, data = self.arm.model, self._data
         pin.framesForwardKinematics(model, data, q)
         tool = data.oMf[model.getFrameId(self.arm.tool_frame, pin.FrameType.BODY)].translation
@@ -111,7 +111,7 @@ class ReferenceSimulator:
         return np.concatenate(parts), float(np.linalg.norm(offset))
 
     def _quaternions(self, q: Array) -> list[Array]:
-        """World orientations of the joint frames as quaternions composed along the chain."""
+        """World orientations of joint frames, composed along the chain."""
         world = pin.Quaternion.Identity()
         quaternions = []
         for k in range(self.arm.n_joints):
@@ -124,7 +124,7 @@ class ReferenceSimulator:
         return quaternions
 
     def first_contact(self, q: Array, target: Array) -> tuple[str, str] | None:
-        """First pair that touches at the tested configurations of a step, or None."""
+        """First pair that touches at a step's tested configurations, or None."""
         model, geometry = self.arm.model, self.contact_model.geometry
         for k in range(1, self.tested + 1):
             tested = target if k == self.tested else q + k / self.tested * (target - q)

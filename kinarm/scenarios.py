@@ -1,4 +1,4 @@
-"""Scenarios: where an episode starts and what it has to reach."""
+"""Scenarios: starts and goals of episodes."""
 
 from collections.abc import Sequence
 
@@ -12,7 +12,7 @@ from kinarm.world import World
 
 START_ATTEMPTS = 2000
 PREFETCHED = 32
-"""Scenarios that are drawn at a time for the successive episodes of an arm."""
+"""Scenarios drawn at a time for the episodes of an arm."""
 
 
 def draw_scenarios(
@@ -21,14 +21,14 @@ def draw_scenarios(
     """Draw starts, shape (count, n_joints) [rad or m], and goals, shape (count, 3) [m].
 
     Goals are uniform over the task's regions. Each actuated joint starts uniformly within its
-    limits, scaled by the start spread, or the arm starts at one of the task's configurations;
-    starts are rejected until the arm touches nothing and its tool is farther from the goal than
-    the tolerance. After 2000 attempts that is a `kinarm.ProblemError`.
+    limits, scaled by the start spread, or the arm starts at one of the task's configurations,
+    without contact and farther from the goal than the tolerance. If none is found in 2000 attempts,
+    that is a `kinarm.ProblemError`.
 
     Parameters
     ----------
     world, rng, count
-        The world of the problem, source of randomness, and how many.
+        World of the problem, source of randomness, and number.
     start_spread : float, optional
         Instead of the task's.
     """
@@ -43,10 +43,9 @@ def draw_for_each(
     *,
     start_spread: float | None = None,
 ) -> tuple[Array, Array]:
-    """Draw starts and goals from several generators, which are screened together.
+    """Draw starts and goals from several generators, and screen them together.
 
-    Each generator is asked for the same numbers as by `draw_scenarios`; starts and goals have a
-    further first axis, of the generators.
+    Generators give the same numbers as in `draw_scenarios`, along a further first axis.
 
     Parameters
     ----------
@@ -61,8 +60,7 @@ def draw_for_each(
     extent = spread * (arm.upper - arm.lower)
     goals = world.goals.at(_draw(rngs, [count] * len(rngs), 1 + len(world.goals.moving)))
     listed = np.array(task.starts)
-    starts = np.empty((len(goals), arm.n_joints))
-    starts[:] = arm.home
+    starts = np.tile(arm.home, (len(goals), 1))
     pending = np.arange(len(goals))
     for _ in range(START_ATTEMPTS):
         wanted = [len(pending)]
@@ -88,7 +86,7 @@ def draw_for_each(
 
 
 def _draw(rngs: Sequence[np.random.Generator], counts: Sequence[int], width: int) -> Array:
-    """Draw rows of numbers in [0, 1), so many from each generator."""
+    """Draw rows of numbers in [0, 1), so many of each generator."""
     if len(rngs) == 1:
         return rngs[0].random((counts[0], width))
     uniforms, first = np.empty((sum(counts), width)), 0
@@ -100,10 +98,10 @@ def _draw(rngs: Sequence[np.random.Generator], counts: Sequence[int], width: int
 
 
 class ScenarioQueues:
-    """Starts and goals of the successive episodes of many arms, drawn for all of them at a time.
+    """Starts and goals of the episodes of many arms, drawn together.
 
-    Those of an arm are what `draw_scenarios` draws with its generator, a few at a time. There is
-    room for twice as many as are drawn: once an arm has none left, all that have room get some.
+    An arm's are those of `draw_scenarios` with its generator, a few at a time. There is room for
+    two draws: once an arm has no scenario left, all with room get more.
     """
 
     def __init__(self, world: World, n_arms: int) -> None:
@@ -113,12 +111,12 @@ class ScenarioQueues:
         self._taken, self._drawn = np.zeros((2, n_arms), dtype=np.int64)
 
     def seed(self, row: int, rng: np.random.Generator) -> None:
-        """Give an arm another generator, and forget what was drawn for it."""
+        """Give an arm another generator, and forget its drawn scenarios."""
         self._rngs[row] = rng
         self._taken[row] = self._drawn[row] = 0
 
     def put(self, rows: NDArray[np.int64], q: Array, goal: Array) -> None:
-        """Put the next scenarios of some arms into their rows of configurations and goals.
+        """Put the next scenarios of some arms into their rows.
 
         Parameters
         ----------
@@ -131,7 +129,7 @@ class ScenarioQueues:
             deal(rows, *queues, q, goal)
 
     def _draw(self) -> None:
-        """Draw scenarios for all arms that have room for them."""
+        """Draw scenarios for all arms with room."""
         rows = (self._drawn - self._taken <= PREFETCHED).nonzero()[0]
         rngs = [self._rngs[row] for row in rows.tolist()]
         places = (self._drawn[rows, None] + np.arange(PREFETCHED)) % (2 * PREFETCHED)

@@ -1,4 +1,4 @@
-"""The world around the arm: the ground, solid boxes, and where goals may lie.
+"""The world around the arm: the ground, solid boxes, and places of goals.
 
 What is empty or named twice is a `ProblemError`.
 """
@@ -16,7 +16,7 @@ from kinarm.errors import NOT_NEGATIVE, ProblemError, UnknownNameError
 Point = tuple[float, float, float]
 
 ROUNDING = 1e-12
-"""Lengths that differ by less are the same [m]."""
+"""Lengths that differ less are the same [m]."""
 
 
 def _check_box(what: str, lower: Point, upper: Point, *, flat: bool) -> None:
@@ -29,7 +29,7 @@ def _check_box(what: str, lower: Point, upper: Point, *, flat: bool) -> None:
 def rotation_matrix(rpy: Point) -> NDArray[np.float64]:
     """Rotation by roll, pitch and yaw about the fixed axes x, y and z, shape (3, 3).
 
-    Entries are rounded to 12 digits: the same on every machine.
+    Entries have 12 digits: the same on every machine.
     """
     (cr, cp, cy), (sr, sp, sy) = (
         [round(of(angle), 12) + 0.0 for angle in rpy] for of in (math.cos, math.sin)
@@ -101,7 +101,7 @@ class Obstacle(Checked):
 
     @property
     def rotation(self) -> NDArray[np.float64]:
-        """Orientation of its edges in the world, as a rotation matrix, shape (3, 3)."""
+        """Orientation in the world as a rotation matrix, shape (3, 3)."""
         return rotation_matrix((0.0, 0.0, self.yaw))
 
 
@@ -136,16 +136,15 @@ PAPER_GOALS = (
     GoalRegion(name="right", lower=(-0.5, -0.75, 0.325), upper=(0.5, -0.55, 0.325)),
     GoalRegion(name="left", lower=(-0.5, 0.55, 0.325), upper=(0.5, 0.75, 0.325)),
 )
-"""Centres of cubes that lie on the paper's benches."""
+"""Centres of cubes on the paper's benches."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Scene(Checked):
     """Ground, obstacles and goal regions.
 
-    The world frame has z up, x forward (the arm's zero heading) and y to the left; the base of
-    the arm stands at the origin unless told otherwise. The default is the paper's scene (section
-    3.3): two benches to the right and the left of the arm.
+    The world frame has z up, x forward (the arm's zero heading) and y to the left. By default the
+    arm's base is at the origin, in the paper's scene (section 3.3): a bench on each side of it.
 
     Parameters
     ----------
@@ -176,16 +175,16 @@ class Scene(Checked):
                     raise ProblemError(f"two {what}s are called {name!r}")
 
     def goal_region(self, name: str) -> GoalRegion:
-        """Look a goal region up by name; UnknownNameError if the scene has none such."""
+        """Goal region of a name; UnknownNameError if there is none."""
         for region in self.goal_regions:
             if region.name == name:
                 return region
         raise UnknownNameError("goal region", name, (region.name for region in self.goal_regions))
 
     def obstacle_around(self, region: GoalRegion) -> Obstacle | None:
-        """The first obstacle that wholly contains a goal region; None if there is none.
+        """First obstacle that wholly contains a goal region, or None.
 
-        What lies on an obstacle's face is not inside.
+        What lies on an obstacle's face is outside.
         """
         corners = np.array(list(product(*zip(region.lower, region.upper, strict=True))))
         for obstacle in self.obstacles:

@@ -23,35 +23,34 @@ from kinarm.task import ReachTask
 from kinarm.world import World
 
 PolicyFunction = Callable[[Array], ArrayLike]
-"""Maps observations, shape (n, n_observations), to actions, shape (n, n_actuated)."""
+"""Observations, shape (n, n_observations), to actions, shape (n, n_actuated)."""
 
 
 class Simulator:
     """Steps batches of rate-limited joint kinematics with contact checks.
 
     An action in [-1, 1] (clipped) moves its joint by at most its velocity limit times the time
-    step, within the limits. The motion of a step is tested for contact at evenly spaced
-    configurations, the last one included; a move that touches something is refused and ends the
-    episode. An episode also ends when the tool comes within the tolerance of the goal, and is
-    truncated at the horizon.
+    step, within the limits. A step is tested for contact at evenly spaced configurations up to its
+    end; a move that touches something is refused and ends the episode, as does the tool within the
+    tolerance of the goal. Episodes are truncated at the horizon.
 
-    Results depend on nothing but the inputs: not on the number of threads, nor on how episodes
-    are batched. Arrays of a wrong shape, entries that are not finite and starts beyond the limits
-    are a `kinarm.InvalidInputError`, starts that touch something a `kinarm.StartInContactError`.
+    Results depend on the inputs alone: not on threads, nor on batches. Arrays of a wrong shape,
+    entries that are not finite and starts beyond the limits are a `kinarm.InvalidInputError`,
+    starts that touch something a `kinarm.StartInContactError`.
 
     Parameters
     ----------
     problem : ReachProblem, str or Path
-        The problem, its name or its file.
+        The problem, its name or file.
     threads : int, optional
-        Threads for large batches; as many as the processors that this process may use by default.
+        Threads for large batches; as many as available processors by default.
 
     Attributes
     ----------
     world : World
-        Arm and scene, and what can be asked about configurations.
+        Arm and scene, and questions about configurations.
     checked_by_coal : int
-        Configurations that rollouts and steps have asked Coal about so far.
+        Configurations that Coal was asked about so far.
     """
 
     def __init__(self, problem: ProblemLike, *, threads: int | None = None) -> None:
@@ -99,11 +98,11 @@ class Simulator:
 
     @property
     def step_limit(self) -> Array:
-        """Largest move of each actuated joint in a step, shape (n_actions,) [rad or m]."""
+        """Largest move of each actuated joint, shape (n_actions,) [rad or m]."""
         return self.world.rules.step_limit.copy()
 
     def with_tolerance(self, tolerance: float) -> "Simulator":
-        """Another simulator of the same world, for other episodes, with another tolerance [m]."""
+        """Another simulator of the same world with another tolerance [m]."""
         other = copy(self)
         other.world = self.world.with_tolerance(tolerance)
         return other
@@ -126,7 +125,7 @@ class Simulator:
         Parameters
         ----------
         starts, goals : array_like, shape (n, n_joints) and (n, 3)
-            Start configurations within the limits [rad or m], and goal positions [m].
+            Start configurations [rad or m], and goal positions [m].
         record : bool
             Keep the configurations visited.
         """
@@ -162,15 +161,15 @@ class Simulator:
         Parameters
         ----------
         policies : Networks, policy, sequence of policies, or function
-            One policy for all episodes, or one for each. Policies that offer ``networks()`` run
-            compiled; a function from observations (n, n_observations) to actions (n, n_actions)
-            is called once a step for all running episodes.
+            One policy for all episodes, or one for each. Those with ``networks()`` run compiled; a
+            function from observations (n, n_observations) to actions (n, n_actions) is called once
+            a step.
         starts, goals, record
             As for `reset`.
         policy_index : array_like of int, shape (n,), optional
-            Which compiled policy drives which episode, where there are several.
+            Compiled policy of each episode, if there are several.
         shift : ndarray, shape (n_observations,), optional
-            Collect moments of the observations about this point.
+            Collect moments of the observations about it.
         """
         q, goal = self.check_scenarios(starts, goals)
         if shift is not None:
@@ -210,7 +209,7 @@ class Simulator:
         return Rollouts.from_episodes(q, self._run(session))
 
     def contact_pairs(self, rollouts: Rollouts) -> tuple[tuple[str, str] | None, ...]:
-        """Name the bodies that touched, per episode; None where nothing did."""
+        """Bodies that touched, per episode; None where nothing did."""
         return tuple(
             self.world.contact_pair(rollouts.configurations[i], rollouts.targets[i])
             if collided
@@ -219,7 +218,7 @@ class Simulator:
         )
 
     def begin(self, episodes: Episodes, rows: NDArray[np.int64]) -> None:
-        """Start those episodes that rows number, in place, at their ``q`` and ``goal``."""
+        """Start episodes of some rows, in place, at their ``q`` and ``goal``."""
         self._start(rows, self._stepped(episodes))
 
     def check_scenarios(self, starts: ArrayLike, goals: ArrayLike) -> tuple[Array, Array]:
@@ -242,10 +241,7 @@ class Simulator:
     def _refilled(
         self, control: Control, starts: Array, goals: Array, shift: Array | None
     ) -> Session:
-        """The last rollout's session, since binding takes longer than a rollout, or another.
-
-        No other thread gets it meanwhile.
-        """
+        """The last rollout's session, for this thread alone, or another."""
         with suppress(IndexError):
             session = self._idle.pop()
             if session.refill(control, starts, goals, shift):
@@ -254,7 +250,7 @@ class Simulator:
         return self.world.session(own, self.world.episodes(starts, goals, shift=shift))
 
     def _run(self, session: Session) -> Episodes:
-        """Start the episodes of a session, and advance them to their end."""
+        """Start a session's episodes, and advance them to their end."""
         n = len(session.episodes.status)
         self._start(np.arange(n), session)
         self._advance(session, n * self.task.horizon)
@@ -274,7 +270,7 @@ class Simulator:
         episodes.status[paused] = RUNNING
 
     def _stepped(self, episodes: Episodes) -> Session:
-        """The session by which episodes are stepped, kept until other episodes come."""
+        """Session of stepped episodes, kept until others come."""
         if self._last is None or self._last.episodes is not episodes:
             control = Control(actions=np.zeros((len(episodes.status), 1, self.n_actions)))
             self._last = self.world.session(control, episodes)
@@ -293,7 +289,7 @@ class Simulator:
         return session
 
     def _advance(self, session: Session, work: int) -> None:
-        """Advance episodes to their stop, asking Coal about every step that is in doubt."""
+        """Advance episodes to their stop; Coal decides about steps in doubt."""
         episodes = session.episodes
         while run_together(advance, work, self.threads, session.of_thread):
             paused = np.flatnonzero(episodes.status == PAUSED)
@@ -303,21 +299,21 @@ class Simulator:
             work = int((episodes.stop - episodes.steps)[resumed].sum())
 
     def _decide(self, session: Session, paused: NDArray[np.int64]) -> NDArray[np.int64]:
-        """Let Coal refuse steps in doubt that touch something; return which episodes go on."""
+        """Let Coal refuse steps in doubt; return which episodes go on."""
         episodes = session.episodes
         ways = self.world.substeps(episodes.q[paused], episodes.target[paused])
         contacts = self.world.contact_model
         touched, asked = contacts.first_contacts(ways, episodes.doubt[paused])
         self.checked_by_coal += asked
         refused = touched != 0
+        resumed: NDArray[np.int64] = paused[~refused]
         episodes.touched[paused] = touched
-        episodes.status[paused[~refused]] = RUNNING
+        episodes.status[resumed] = RUNNING
         episodes.cleared[paused] = ~refused
         if refused.any():
             refuse(paused[refused], session)
-            # Those of which only contact as such is known.
+            # Only contact as such is known of these.
             episodes.touched[paused[touched < 0]] = 0
-        resumed: NDArray[np.int64] = paused[~refused]
         return resumed
 
     def _follow(self, policy: PolicyFunction, episodes: Episodes) -> None:

@@ -1,7 +1,6 @@
-"""Reaching tasks: goals, tolerance, horizon, starts and reward; and how time passes.
+"""Reaching tasks: goals, tolerance, horizon, starts and reward; and time.
 
-Numbers that are out of range are an `InvalidInputError`, and what does not fit together is a
-`ProblemError`.
+Numbers out of range are an `InvalidInputError`, what does not match is a `ProblemError`.
 """
 
 from dataclasses import dataclass, field, fields
@@ -15,12 +14,12 @@ from kinarm.errors import POSITIVE, SHARE, ProblemError
 from kinarm.scene import Scene
 
 LONGEST_HORIZON = 1_000_000
-"""Steps of an episode at most: memory grows with them."""
+"""Largest number of steps of an episode: memory grows with it."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class RewardWeights(Checked):
-    """Weights of the reward terms; their formulas are in `kinarm.kernels.reward`.
+    """Weights of the reward terms, whose formulas are in `kinarm.kernels.reward`.
 
     Parameters
     ----------
@@ -75,11 +74,11 @@ class Goals(NamedTuple):
     lower : ndarray, shape (n_regions, 3)
         Lower corners of the regions [m].
     extent : ndarray, shape (n_regions, n_moving)
-        Their edges along the axes along which any has one [m].
+        Their edges along `moving` [m].
     moving : ndarray of int, shape (n_moving,)
-        These axes.
+        Axes along which any region has an edge.
     ends : ndarray, shape (n_regions - 1,)
-        Where in [0, 1) the share of each region ends.
+        Ends of the regions' shares in [0, 1).
     """
 
     lower: NDArray[np.float64]
@@ -88,13 +87,13 @@ class Goals(NamedTuple):
     ends: NDArray[np.float64]
 
     def draw(self, rng: np.random.Generator, count: int) -> NDArray[np.float64]:
-        """Draw goals, uniform over each region, shape (count, 3) [m]."""
+        """Draw goals, shape (count, 3) [m], uniform over each region."""
         return self.at(rng.random((count, 1 + len(self.moving))))
 
     def at(self, uniforms: NDArray[np.float64]) -> NDArray[np.float64]:
         """Goals, shape (n, 3) [m], of numbers in [0, 1), shape (n, 1 + n_moving).
 
-        The first number of a row chooses the region, and the others where in it the goal lies.
+        A row's first number chooses the region, and the others the place in it.
         """
         chosen = self.ends.searchsorted(uniforms[:, 0], side="right")
         goals: NDArray[np.float64] = self.lower[chosen]
@@ -144,7 +143,7 @@ class ReachTask(Checked):
             )
 
     def goals_in(self, scene: Scene) -> Goals:
-        """Where in a scene goals lie."""
+        """Where goals lie in a scene."""
         regions = [scene.goal_region(name) for name in self.goal_regions]
         lower, upper = np.array([(r.lower, r.upper) for r in regions]).transpose(1, 0, 2)
         weights = self.goal_weights or (1.0,) * len(regions)

@@ -1,8 +1,7 @@
-"""Robot descriptions: what of a URDF an arm is made of, as a text that Pinocchio can read.
+"""Robot descriptions: a URDF reduced to an arm, as text for Pinocchio.
 
-Of a tree of links, the joints between base and tool are kept. The others, and those that are to
-be held, become fixed where they are held; joints that mimic a held one follow it. Continuous joints
-get a range, and the names of meshes become paths.
+Joints between base and tool are kept. Others, and held ones with all that mimic them, become fixed.
+Continuous joints get a range, and mesh names become paths.
 """
 
 import math
@@ -23,10 +22,10 @@ from kinarm.meshes import resolve_meshes
 from kinarm.urdf_tree import MOVING, TreeJoint, chain_to, read_joints, read_robot
 
 USUAL_TOOL = "tool0"
-"""Name of the tool frame by ROS's convention."""
+"""The tool frame's name by ROS's convention."""
 
 FARTHEST_POSITION = 1e6
-"""Positions of joints at most [rad or m]: up to there, the kernels' sines are exact."""
+"""Largest positions of joints [rad or m]: kernels' sines are exact up to there."""
 
 
 class Description(NamedTuple):
@@ -37,13 +36,13 @@ class Description(NamedTuple):
     path : Path
         The file.
     text : str
-        Its text, in which all moving joints are in series, from the base to the tool.
+        Its text, with all moving joints in series from the base to the tool.
     tool_frame : str
         Link whose origin is the tool point.
     held : dict
         Positions at which joints were fixed, by name [rad or m].
     notes : tuple of str
-        What was chosen where nothing was said.
+        Choices where nothing was said.
     """
 
     path: Path
@@ -54,7 +53,7 @@ class Description(NamedTuple):
 
 
 def _find_urdf(source: str) -> Path:
-    """Resolve the source of a completed specification to a file."""
+    """File of a completed specification."""
     if source.startswith(PACKAGE):
         return _installed(source)
     path = Path(source)
@@ -68,7 +67,7 @@ def _find_urdf(source: str) -> Path:
 
 
 def _installed(source: str) -> Path:
-    """Find a file of the installed package of robot descriptions."""
+    """File of the installed package of robot descriptions."""
     name, _, inside = source.partition(":")
     try:
         package = metadata.distribution(name)
@@ -83,10 +82,10 @@ def _installed(source: str) -> Path:
 
 
 def read_urdf(specification: ArmSpecification) -> Description:
-    """Read the URDF of a completed specification, reduced to the chain that carries the tool.
+    """Read the URDF of a completed specification, reduced to the chain of the tool.
 
-    Raises ArmError if there is no such file, it is malformed or the robot cannot be reduced to a
-    chain, and UnknownNameError if a name stands for no arm, joint or link.
+    Raises ArmError if the file is missing, malformed or not reducible to a chain, and
+    UnknownNameError if a name stands for no arm, joint or link.
     """
     path = _find_urdf(specification.source)
     try:
@@ -96,7 +95,7 @@ def read_urdf(specification: ArmSpecification) -> Description:
 
 
 def _reduced(path: Path, specification: ArmSpecification) -> Description:
-    """Read a URDF, and keep the chain that carries the tool; errors leave out the file's name."""
+    """Read a URDF, reduced to the tool's chain; errors lack the file's name."""
     robot = read_robot(path)
     joints = read_joints(robot)
     links = [link.get("name", "") for link in robot.findall("link")]
@@ -136,7 +135,7 @@ def _reduced(path: Path, specification: ArmSpecification) -> Description:
 def _tool_frame(
     asked: str | None, joints: Mapping[str, TreeJoint], links: list[str]
 ) -> tuple[str, tuple[str, ...]]:
-    """The tool frame, and a note if it had to be chosen."""
+    """The tool frame, with a note if it was chosen."""
     if asked is not None or USUAL_TOOL in links:
         chosen = asked or USUAL_TOOL
         if chosen not in links:
@@ -154,7 +153,7 @@ def _tool_frame(
 
 
 def _bounded(joint: TreeJoint, limits: Mapping[str, tuple[float, float]]) -> tuple[str, ...]:
-    """See that a joint that is kept has limits; return what was chosen."""
+    """Check a kept joint's limits; return what was chosen."""
     element, name = joint.element, joint.name
     if joint.mimics is not None:
         raise ArmError(
@@ -205,7 +204,7 @@ def _held_positions(
 
 
 def _near_zero(joint: TreeJoint) -> float:
-    """Position closest to zero within the limits of a joint, if it has any."""
+    """Position closest to zero within a joint's limits, if any."""
     limit = joint.element.find("limit")
     if limit is None or joint.kind == "continuous":
         return 0.0
@@ -213,7 +212,7 @@ def _near_zero(joint: TreeJoint) -> float:
 
 
 def _fix(joint: TreeJoint, position: float) -> None:
-    """Make a joint a fixed one at a position."""
+    """Fix a joint at a position."""
     element = joint.element
     element.set("type", "fixed")
     for mimic in element.findall("mimic"):

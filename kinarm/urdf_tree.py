@@ -1,4 +1,4 @@
-"""Robot descriptions as their files have them: a tree of links and joints, checked."""
+"""Robot descriptions in files: checked trees of links and joints."""
 
 import math
 from collections import Counter
@@ -32,17 +32,17 @@ NUMBERS: dict[str, dict[str, tuple[int, str]]] = {
     "mesh": {"scale": (3, "1 1 1")},
     "color": {"rgba": (4, "0 0 0 1")},
 }
-"""Attributes that hold numbers: how many, and which they are where they are left out."""
+"""Attributes with numbers: how many, and their defaults."""
 
 RANGES = {"limit": (-1e308, 1e308)} | dict.fromkeys(SHAPES[:4], (1e-9, FARTHEST))
-"""Range of these numbers, where it is not that of lengths; limits need not be used."""
+"""Ranges of these numbers, if not that of lengths."""
 
 NEEDED = {
     "robot": ("link", "joint", "material"),
     "link": ("visual", "collision"),
     "joint": ("origin", "parent", "child", "axis", "limit", "mimic"),
 }
-"""Elements that count for something, by those around them."""
+"""Elements that are used, by the elements around them."""
 
 
 class TreeJoint(NamedTuple):
@@ -56,13 +56,13 @@ class TreeJoint(NamedTuple):
 
     @property
     def mimics(self) -> str | None:
-        """The joint that it mimics."""
+        """Joint that it mimics."""
         mimic = self.element.find("mimic")
         return None if mimic is None else mimic.get("joint")
 
 
 def parse_xml(content: bytes) -> Element:
-    """The root of an XML document; raises ValueError if it is damaged."""
+    """Root of an XML document; raises ValueError if it is damaged."""
     try:
         return ElementTree.fromstring(content)
     except (ElementTree.ParseError, LookupError) as error:  # the latter of an unknown encoding
@@ -70,10 +70,10 @@ def parse_xml(content: bytes) -> Element:
 
 
 def read_robot(path: Path) -> Element:
-    """The root of a URDF, without what nobody needs; its numbers are written as Python does.
+    """Root of a URDF with only the used elements, and numbers as Python writes them.
 
-    Joints have an origin and an axis. Visual shapes stay as they are: who draws them checks them.
-    Raises ArmError if the file is none, a name or shape is missing, or a number is out of range.
+    Joints get origins and axes. Visual shapes stay unchecked. Raises ArmError if the file is no
+    URDF, a name or shape is missing, or a number is out of range.
     """
     try:
         robot = parse_xml(path.read_bytes())
@@ -93,7 +93,7 @@ def read_robot(path: Path) -> Element:
 
 
 def _check_joint(joint: Element, where: str) -> None:
-    """Complete a joint, and check its numbers."""
+    """Complete a joint and check its numbers."""
     for name in ("origin", "axis"):
         if joint.find(name) is None:
             ElementTree.SubElement(joint, name)
@@ -107,7 +107,7 @@ def _check_joint(joint: Element, where: str) -> None:
 
 
 def _check_shape(collision: Element, where: str) -> None:
-    """Check numbers of a collision element, and drop all but the first of its shapes."""
+    """Check a collision element's numbers, and drop further shapes."""
     geometry = collision.find("geometry")
     if geometry is None or not len(geometry) or geometry[0].tag not in SHAPES:
         raise ArmError(f"{where} needs a shape of {', '.join(SHAPES)} in each collision element")
@@ -117,7 +117,7 @@ def _check_shape(collision: Element, where: str) -> None:
 
 
 def check_numbers(element: Element, where: str) -> None:
-    """Check the numbers of an element, called ``where``, and rewrite them.
+    """Check and rewrite the numbers of an element, called ``where``.
 
     Raises ArmError if one is missing, none, too many or out of range.
     """
@@ -133,12 +133,12 @@ def check_numbers(element: Element, where: str) -> None:
                 f"{where}: numbers of {name} of <{element.tag}> must be {count} from {least:g} to "
                 f"{most:g}, got {given!r}"
             )
-        # Pinocchio's reader refuses numbers that are almost zero.
+        # Pinocchio refuses numbers that are almost zero.
         element.set(name, " ".join(repr(x if abs(x) > 1e-300 else 0.0) for x in numbers))
 
 
 def read_joints(robot: Element) -> dict[str, TreeJoint]:
-    """Joints by name; raises ArmError if they and the links are no tree on a fixed base."""
+    """Joints by name; raises ArmError unless they form a tree on a fixed base."""
     found: dict[str, TreeJoint] = {}
     links = [link.get("name", "") for link in robot.findall("link")]
     carried: dict[str, str] = {}
@@ -168,7 +168,7 @@ def read_joints(robot: Element) -> dict[str, TreeJoint]:
 def _check_tree(
     joints: Mapping[str, TreeJoint], links: list[str], carried: Mapping[str, str]
 ) -> None:
-    """Refuse names that are missing or not unique, and links that do not hang on the base."""
+    """Refuse missing or repeated names, and links that hang on no base."""
     for what, names in (("joint", list(carried.values())), ("link", links)):
         for name, count in Counter(names).items():
             if not name or count > 1:
@@ -183,7 +183,7 @@ def _check_tree(
 
 
 def chain_to(link: str, joints: Mapping[str, TreeJoint]) -> list[TreeJoint]:
-    """Moving joints between the base and a link, in that order."""
+    """Moving joints from the base to a link."""
     carrier = {joint.child: joint for joint in joints.values()}
     chain: list[TreeJoint] = []
     while link in carrier:

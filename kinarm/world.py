@@ -1,4 +1,4 @@
-"""The world of a problem: arm and scene, and what can be asked about configurations in it."""
+"""The world of a problem: arm, scene, and questions about configurations."""
 
 from copy import copy
 from functools import cached_property
@@ -32,9 +32,9 @@ class World(Kinematics):
     Parameters
     ----------
     problem : ReachProblem, str or Path
-        The problem, its name or its file.
+        The problem, its name or file.
     threads : int, optional
-        Threads for large batches; as many as the processors that this process may use by default.
+        Threads for large batches; as many as available processors by default.
 
     Attributes
     ----------
@@ -43,7 +43,7 @@ class World(Kinematics):
     contact_model : ContactModel
         Shapes that may touch.
     rules : Rules
-        Task and motion limits as the kernels need them.
+        Task and motion limits for the kernels.
     """
 
     def __init__(self, problem: ProblemLike, *, threads: int | None = None) -> None:
@@ -67,7 +67,7 @@ class World(Kinematics):
         self._shares = np.arange(1, n_tested + 1)[:, None] / n_tested
 
     def _check_starts(self) -> None:
-        """Refuse configurations that the task lists but that nothing can start at."""
+        """Refuse impossible starts of the task."""
         for number, start in enumerate(self.problem.task.starts):
             name = f"task.starts[{number}]"
             q = finite_array(name, start, (self.arm.n_joints,))
@@ -81,14 +81,14 @@ class World(Kinematics):
         return f"World({self.problem!r})"
 
     def with_tolerance(self, tolerance: float) -> "World":
-        """The same world with another tolerance [m]; it shares all that was built."""
+        """The same world with another tolerance [m]; it shares all else."""
         other = copy(self)
         other.problem = self.problem.replace(tolerance=tolerance)
         other.rules = self.rules._replace(tolerance=float(tolerance))
         return other
 
     def __getstate__(self) -> dict[str, Any]:
-        # A copy may get other rules, and has work space of its own.
+        # A copy may get other rules, and needs its own work space.
         kept = {name: value for name, value in self.__dict__.items() if name != "records"}
         return kept | {"_idle": []}
 
@@ -100,9 +100,8 @@ class World(Kinematics):
     @cached_property
     def records(self) -> tuple[Chain, ContactShapes, Rules]:
         """Chain, shapes and rules for the kernels, by their addresses."""
-        parts = (self.arm.chain, self.contact_model.shapes, self.rules)
-        chain, shapes, rules = (recorded(part) for part in parts)
-        return chain, shapes, rules
+        shapes = self.contact_model.shapes
+        return recorded(self.arm.chain), recorded(shapes), recorded(self.rules)
 
     @property
     def n_observations(self) -> int:
@@ -115,14 +114,14 @@ class World(Kinematics):
         return self.arm.n_actuated
 
     def observe(self, configurations: ArrayLike, goals: ArrayLike) -> Array:
-        """Observations of configurations, shape (n, n_observations), whether or not they touch.
+        """Observations of configurations, shape (n, n_observations), also of those in contact.
 
         Takes joint positions, shape (n, n_joints) [rad or m], and goals, shape (n, 3) [m].
         """
         return self._begun_at(configurations, goals).observation
 
     def distances(self, configurations: ArrayLike, goals: ArrayLike) -> Array:
-        """Distances from the tool to goals, shape (n,) [m]; takes what `observe` does."""
+        """Distances of the tool from goals, shape (n,) [m]; see `observe`."""
         return self._begun_at(configurations, goals).distance
 
     def screen(self, configurations: ArrayLike) -> tuple[Array, NDArray[np.bool_]]:
@@ -134,7 +133,7 @@ class World(Kinematics):
         return self.screened(q)
 
     def screened(self, q: Array) -> tuple[Array, NDArray[np.bool_]]:
-        """As `screen`, for finite configurations in a contiguous array."""
+        """`screen` for finite configurations in a contiguous array."""
         tools, free, touching, n_proven = self.proven(q)
         if n_proven < len(q):
             doubtful = ~(free | touching)
@@ -144,8 +143,7 @@ class World(Kinematics):
     def proven(self, q: Array) -> tuple[Array, NDArray[np.bool_], NDArray[np.bool_], int]:
         """Tool points of finite configurations [m], and what kernels prove of these.
 
-        That is: which surely are free, which surely touch, and how many these are together; about
-        the others Coal has to decide.
+        These are: free ones, touching ones, and their number; Coal decides about others.
         """
         n = len(q)
         tools, free, touching = np.empty((n, 3)), np.empty(n, dtype=bool), np.empty(n, dtype=bool)
@@ -157,23 +155,22 @@ class World(Kinematics):
     def clearance(self, configurations: ArrayLike) -> Clearance:
         """Measure how far the closest of the tested pairs is apart, and where.
 
-        Takes configurations as `poses` does. Distances of capsules, spheres, boxes, convex hulls
-        and the ground are compiled, to within 1e-10 m. Coal measures where a cylinder may be
-        closest, and where shapes overlap: capsules and spheres deeper than their radii, others at
-        all.
+        Takes configurations as `poses` does. Capsules, spheres, boxes, convex hulls and the ground
+        are measured to within 1e-10 m. Coal measures where a cylinder may be closest, and
+        overlaps, those of capsules and spheres if deeper than their radii.
         """
         q, one = one_or_many("configurations", configurations, (self.arm.n_joints,))
         found = measure_clearance(self.contact_model, self._bodies, q, self.threads)
         return Clearance(*(each[0] for each in found)) if one else found
 
     def in_contact(self, configurations: ArrayLike) -> NDArray[np.bool_]:
-        """Tell which configurations touch something, shape () or (n,), given as for `poses`."""
+        """Whether configurations, as for `poses`, touch something, shape () or (n,)."""
         q, one = one_or_many("configurations", configurations, (self.arm.n_joints,))
         touching = self.screen(q)[1]
         return touching[0] if one else touching
 
     def contact_pairs(self, configurations: ArrayLike) -> tuple[tuple[str, str] | None, ...]:
-        """Name the first tested pair that touches, per configuration; None where nothing does.
+        """First tested pair that touches, per configuration; None where nothing does.
 
         Takes joint positions, shape (n, n_joints) [rad or m].
         """
@@ -184,12 +181,12 @@ class World(Kinematics):
         return tuple(pairs)
 
     def contact(self, configuration: ArrayLike, target: ArrayLike | None = None) -> Contact | None:
-        """Describe the contact of a configuration, or the first on a step's way; None without one.
+        """Describe the contact of a configuration, or the first one of a step; None if none.
 
         Parameters
         ----------
         configuration : array_like, shape (n_joints,)
-            Where the arm is, or the step begins [rad or m].
+            Where the arm is or the step begins [rad or m].
         target : array_like, shape (n_joints,), optional
             Where the step ends [rad or m].
         """
@@ -204,15 +201,15 @@ class World(Kinematics):
     def contact_pair(
         self, configuration: ArrayLike, target: ArrayLike | None = None
     ) -> tuple[str, str] | None:
-        """Name the two bodies of what `contact` describes, or None."""
+        """Names of the bodies of what `contact` describes, or None."""
         contact = self.contact(configuration, target)
         return contact.pair if contact else None
 
     def substeps(self, configurations: Array, targets: Array) -> Array:
         """Configurations at which the motion of a step is tested for contact.
 
-        Takes the ends of steps, shape (n, n_joints), and returns evenly spaced configurations,
-        shape (n, n_tested, n_joints), of which the last one is the target [rad or m].
+        Takes ends of steps, shape (n, n_joints), and returns evenly spaced configurations, shape
+        (n, n_tested, n_joints), of which the last is the target [rad or m].
         """
         ways = configurations[:, None] + self._shares * (targets - configurations)[:, None]
         ways[:, -1] = targets
@@ -221,7 +218,7 @@ class World(Kinematics):
     def episodes(
         self, starts: Array, goals: Array, *, record: bool = False, shift: Array | None = None
     ) -> Episodes:
-        """Episodes at their starts; the kernel ``begin`` fills in the rest.
+        """Episodes at their starts; the kernel ``begin`` completes them.
 
         Parameters
         ----------
@@ -230,7 +227,7 @@ class World(Kinematics):
         record : bool
             Whether configurations are kept.
         shift : ndarray, shape (n_observations,), optional
-            Collect sums of the observations about this point.
+            Collect sums of the observations about it.
         """
         n, n_joints = starts.shape
         horizon, n_observations = self.rules.horizon, self.n_observations
@@ -255,11 +252,11 @@ class World(Kinematics):
         )
 
     def session(self, control: Control, episodes: Episodes) -> Session:
-        """Bind episodes, and where their actions come from, for the kernels."""
+        """Bind episodes and their source of actions for the kernels."""
         return Session(*self.records, recorded(control), recorded(episodes))
 
     def _screen_some(self, first: int, last: int, *arrays: Any) -> int:
-        """Screen some rows, with work space that no other thread uses."""
+        """Screen some rows, with work space for this thread alone."""
         try:
             space = self._idle.pop()
         except IndexError:
@@ -274,7 +271,7 @@ class World(Kinematics):
         return flattened(self.contact_model.geometry)
 
     def _begun_at(self, configurations: ArrayLike, goals: ArrayLike) -> Episodes:
-        """Episodes that begin at configurations, whether or not those touch something."""
+        """Episodes that begin at configurations, in contact or not."""
         q = finite_array("configurations", configurations, (None, self.arm.n_joints))
         goal = finite_array("goals", goals, (len(q), 3))
         session = self.session(Control(), self.episodes(q, goal))

@@ -1,4 +1,4 @@
-"""Environments for Gymnasium: one arm, and a native batch of many; importing it registers them."""
+"""Gymnasium environments, single and in batches, registered on import."""
 
 import lazy_loader
 from gymnasium.envs.registration import register
@@ -7,13 +7,13 @@ KINDS = {
     "Reach": ("kinarm.envs.reach:ReachEnv", "kinarm.envs.vector:ReachVectorEnv"),
     "ReachGoal": ("kinarm.envs.goal:ReachGoalEnv", "kinarm.envs.goal:ReachGoalVectorEnv"),
 }
-"""Classes of the single environment and of the native batch."""
+"""Classes of single environments and native batches."""
 
 TASKS = {"Left": "left", "Right": "right", "Both": "both", "": "right"}
-"""Problems as they are called in ids; the last id is for those that ``problem`` names."""
+"""Problems by their names in ids; the last id takes any ``problem``."""
 
 ENVIRONMENTS: dict[str, str] = {}
-"""Ids of the environments and their problems."""
+"""Problems of environments by id."""
 
 for kind, (entry_point, vector_entry_point) in KINDS.items():
     for task, problem in TASKS.items():

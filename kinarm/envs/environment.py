@@ -1,7 +1,4 @@
-"""The frame of every environment: how it is made and ends, its specification, what touched.
-
-And how it shows its simulator: observations, rewards and how episodes end.
-"""
+"""The common part of all environments: life, specification, contacts, interface."""
 
 import json
 from collections.abc import Mapping
@@ -30,7 +27,7 @@ Observations = Any
 """An array, or a dictionary of arrays; one row per arm."""
 
 Outcome = tuple[Array, NDArray[np.bool_], NDArray[np.bool_]]
-"""Rewards of a step, and which episodes ended by themselves or at the horizon, shape (n,) each."""
+"""Rewards, and which episodes terminated or were truncated, shape (n,) each."""
 
 DTYPES = ("float64", "float32")
 
@@ -40,11 +37,11 @@ SETTINGS = (
     *("render_mode", "width", "height", "camera", "observation_dtype", "reward_type"),
     *("num_envs", "autoreset_mode", "threads", "vectorization_mode"),
 )
-"""Arguments of environments that are not part of their problem."""
+"""Arguments of environments beside their problem's."""
 
 
 class ResetNeededError(InvalidInputError, gymnasium.error.ResetNeeded):
-    """An environment was stepped or rendered before its first reset."""
+    """An environment was used before its first reset."""
 
 
 class ClosedEnvironmentError(InvalidInputError, gymnasium.error.ClosedEnvironmentError):
@@ -52,18 +49,18 @@ class ClosedEnvironmentError(InvalidInputError, gymnasium.error.ClosedEnvironmen
 
 
 class UnexpectedArgumentError(InvalidInputError, TypeError):
-    """An environment cannot be made with an argument of this name.
+    """An environment has no argument of this name.
 
-    As everywhere in Python it is a TypeError, by which libraries that try arguments go.
+    It is a TypeError, as in Python, for libraries that try arguments.
     """
 
 
 class Interface:
-    """The way in which an environment shows its simulator: with its own observation and reward.
+    """How an environment shows its simulator: its observation and reward.
 
     Spaces are those of one arm; observations are float64 or float32, actions fractions of the
-    velocity limits. ``tells_terms`` says whether the reward is the sum of the problem's reward
-    terms, which infos then tell.
+    velocity limits. ``tells_terms`` says whether the reward sums up the problem's terms, which
+    infos then hold.
     """
 
     observation_space: Space[Any]
@@ -86,27 +83,27 @@ class Interface:
         self.observation_space = self._space()
 
     def _space(self) -> Space[Any]:
-        """Space of what `observe` returns for one arm."""
+        """Space of `observe` for one arm."""
         return bounded_space(state_bounds(self.simulator), self._dtype)
 
     def observe(self, observations: Array) -> Observations:
-        """Copy the simulator's observations, shape (n, n_observations), as they are shown."""
+        """Show copies of the simulator's observations, shape (n, n_observations)."""
         return observations.astype(self._dtype)
 
     def step_outcome(self, episodes: Episodes, result: StepResult) -> Outcome:  # noqa: ARG002
-        """Reward a step, and say which episodes are over; may let episodes go on."""
+        """Reward a step, and tell or change which episodes are over."""
         return result.reward, result.terminated, result.truncated
 
 
 def one_by_one(observations: Observations, count: int) -> list[Any]:
-    """Split a batch of observations, as an interface shows them, into those of single arms."""
+    """Split a batch of shown observations into those of single arms."""
     if isinstance(observations, dict):
         return [{key: part[k] for key, part in observations.items()} for k in range(count)]
     return list(observations)
 
 
 def state_bounds(simulator: Simulator) -> tuple[Array, Array]:
-    """Bounds of an observation: goals to within the tolerance, quaternions to within rounding."""
+    """Bounds of an observation, with tolerances for goals and quaternions."""
     task = simulator.task
     regions = [simulator.scene.goal_region(name) for name in task.goal_regions]
     ranges = Ranges(
@@ -118,20 +115,20 @@ def state_bounds(simulator: Simulator) -> tuple[Array, Array]:
 
 
 def bounded_space(bounds: tuple[Array, Array], dtype: np.dtype[Any]) -> Space[Any]:
-    """Space of vectors of a type between a lower and an upper bound, shape (n,) each."""
+    """Space of vectors of a type between two bounds, shape (n,) each."""
     lower, upper = (bound.astype(dtype) for bound in bounds)
     return Box(lower, upper, dtype=dtype.type)
 
 
 class Lifecycle:
-    """An environment that refuses to be used before its first reset, and after its end."""
+    """An environment that refuses use before a reset and after its end."""
 
     closed: bool = False
     _episodes: Episodes | None = None
 
     @property
     def episodes(self) -> Episodes:
-        """The episodes under way, one row per arm; refused after the end, and before a reset."""
+        """The episodes, one row per arm; refused before a reset and after the end."""
         self._check_open()
         if self._episodes is None:
             raise ResetNeededError("the environment was never begun: call reset()")
@@ -168,7 +165,7 @@ class ArmEnvironment(Lifecycle):
         render_mode: str | None,
         **picture: Any,
     ) -> None:
-        """Build a simulator, and say how its arms are shown; settings are those of `ReachEnv`."""
+        """Build simulator and interface by the settings of `ReachEnv`."""
         try:
             changed = ReachProblem.load(problem).replace(**overrides)
             self.simulator = simulator = Simulator(changed, threads=threads)
@@ -187,10 +184,10 @@ class ArmEnvironment(Lifecycle):
         self._pictures = EnvPictures(simulator, render_mode, num_envs, **picture)
 
     def _begin(self, rows: NDArray[np.int64], options: Mapping[str, Any] | None = None) -> Episodes:
-        """Begin episodes of some arms; options may set ``start`` and ``goal`` of all of them."""
+        """Begin episodes of some arms; options may set all ``start`` and ``goal``."""
         n_joints = self.simulator.arm.n_joints
         fixed = fixed_scenario(options, n_joints)
-        if "start" in fixed:  # refuse what no episode can start at
+        if "start" in fixed:  # refuse one in contact
             self.simulator.reset(fixed["start"][None], np.zeros((1, 3)))
         if self._episodes is None:
             q, goals = np.empty((self._n_arms, n_joints)), np.empty((self._n_arms, 3))
@@ -210,7 +207,7 @@ class ArmEnvironment(Lifecycle):
     def _find_contacts(self, episodes: Episodes, result: StepResult) -> None:
         """Fill in the numbers of the first contacts of a step that are not known yet.
 
-        Only configurations of the step whose bit of ``doubt`` is set can touch.
+        Only configurations with a set bit of ``doubt`` can touch.
         """
         contact, refused, world = result.contact, result.collision, self.simulator.world
         if np.count_nonzero(refused) == np.count_nonzero(contact):
@@ -227,12 +224,12 @@ class ArmEnvironment(Lifecycle):
 
     @cached_property
     def contact_names(self) -> tuple[tuple[str, str] | None, ...]:
-        """Names of the two bodies of a contact, by its number in the info; 0 is none."""
+        """Names of the bodies of a contact, by its number; 0 is none."""
         return (None, *self.simulator.world.contact_model.pair_names)
 
     @property
     def spec(self) -> EnvSpec | None:
-        """Specification that makes this environment again; it can be written as JSON."""
+        """Specification that makes this environment again, also from JSON."""
         return self._spec
 
     @spec.setter
@@ -241,7 +238,7 @@ class ArmEnvironment(Lifecycle):
 
 
 def fixed_scenario(options: Mapping[str, Any] | None, n_joints: int) -> dict[str, Array]:
-    """The ``start`` [rad or m] and the ``goal`` [m] that the options of a reset set, if they do."""
+    """``start`` [rad or m] and ``goal`` [m] in the options of a reset, if any."""
     given, shapes = dict(options or {}), {"start": (n_joints,), "goal": (3,)}
     unknown = set(given) - set(shapes)
     if unknown:
@@ -250,10 +247,9 @@ def fixed_scenario(options: Mapping[str, Any] | None, n_joints: int) -> dict[str
 
 
 def portable_spec(spec: EnvSpec, simulator: Simulator) -> EnvSpec:
-    """Complete the specification of an environment, so that it can be written as JSON.
+    """Complete an environment's specification for JSON.
 
-    It states the horizon. A problem, or changes to one, that JSON cannot hold are replaced by
-    what `kinarm.ReachProblem.to_json` makes of the whole problem.
+    It states the horizon. What JSON cannot hold becomes `kinarm.ReachProblem.to_json`.
     """
     steps = spec.max_episode_steps or simulator.task.horizon
     given = {name: value for name, value in spec.kwargs.items() if name != "max_episode_steps"}
@@ -267,7 +263,7 @@ def portable_spec(spec: EnvSpec, simulator: Simulator) -> EnvSpec:
 
 
 def _plain(value: Any) -> Any:
-    """A setting as JSON can hold it."""
+    """A setting for JSON."""
     if isinstance(value, Enum):
         return value.value
     return np.dtype(value).name if isinstance(value, type | np.dtype) else value

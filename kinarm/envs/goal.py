@@ -1,4 +1,4 @@
-"""The goal-conditioned environments: goals to be relabelled with hindsight."""
+"""The goal-conditioned environments, for hindsight replay."""
 
 from collections.abc import Mapping
 from typing import Any, Literal, get_args
@@ -27,7 +27,7 @@ RewardType = Literal["sparse", "dense"]
 
 
 class GoalRewards:
-    """Rewards and endings that follow from goals, as hindsight replay needs them."""
+    """Rewards and ends that follow from goals."""
 
     simulator: Simulator
     reward_type: RewardType
@@ -35,14 +35,14 @@ class GoalRewards:
     def compute_reward(
         self, achieved_goal: ArrayLike, desired_goal: ArrayLike, info: object
     ) -> Any:
-        """Reward of having achieved goals while others were desired.
+        """Reward of achieved goals for desired ones.
 
         Parameters
         ----------
         achieved_goal, desired_goal : array_like, shape (..., 3)
             Tool point and goal [m].
         info : mapping or sequence of mapping
-            That of the step, or one for each: whether there was a ``collision``.
+            That of the step, or one for each, with ``collision``.
 
         Returns
         -------
@@ -71,18 +71,18 @@ class GoalRewards:
     def compute_truncated(
         self, achieved_goal: ArrayLike, desired_goal: ArrayLike, info: object
     ) -> Any:
-        """False: only the number of the step decides.
+        """False: the step's number alone decides.
 
         Parameters
         ----------
         achieved_goal, desired_goal, info
-            As for `compute_reward`; infos have no effect.
+            As for `compute_reward`, without effect.
         """
         return self.compute_terminated(achieved_goal, desired_goal, info) & False
 
 
 class GoalInterface(GoalRewards, Interface):
-    """Goals as a dictionary, and rewards that can be computed for any goals.
+    """Goals as a dictionary, and rewards for any goals.
 
     A move that would touch something is refused and costs the problem's reward for a collision.
     The episode goes on, so giving up never pays. Arguments are as for `ReachGoalEnv`.
@@ -122,7 +122,7 @@ class GoalInterface(GoalRewards, Interface):
         return {"observation": own, "achieved_goal": achieved, "desired_goal": desired}
 
     def _own_parts(self, observations: Array) -> Array:
-        """The parts of observations that do not depend on the goal, shape (..., n)."""
+        """Parts of observations that do not depend on the goal, shape (..., n)."""
         return np.concatenate([observations[..., place] for place in self._own], axis=-1)
 
     def _goals(self, observations: Array) -> tuple[NDArray[Any], NDArray[Any]]:
@@ -132,7 +132,7 @@ class GoalInterface(GoalRewards, Interface):
         return tools.astype(self._dtype, copy=False), goals.astype(self._dtype)
 
     def step_outcome(self, episodes: Episodes, result: StepResult) -> Outcome:
-        """Reward by the goals, and let episodes go on whose move was refused."""
+        """Reward by the goals; episodes go on after a refused move."""
         truncated = result.truncated
         if np.count_nonzero(result.collision):
             episodes.resume(result.collision.nonzero()[0], self.simulator.task.horizon)
@@ -143,7 +143,7 @@ class GoalInterface(GoalRewards, Interface):
 
 
 class GoalEnvironment(GoalRewards, ArmEnvironment):
-    """An environment that shows its simulator by a `GoalInterface`."""
+    """An environment with a `GoalInterface`."""
 
     def __init__(
         self, *arguments: Any, reward_type: RewardType = "sparse", **settings: Any
@@ -163,8 +163,7 @@ class ReachGoalEnv(GoalEnvironment, ReachEnv):
     problem : ReachProblem, str or Path
         As for `ReachEnv`.
     reward_type : {"sparse", "dense"}
-        -1 for every step that does not reach the goal and 0 for the one that does, or minus the
-        distance [m].
+        -1 for each step but 0 for one that reaches the goal, or minus the distance [m].
     **settings
         As for `ReachEnv`; only ``collision`` of the problem's own reward has an effect.
 
@@ -176,13 +175,13 @@ class ReachGoalEnv(GoalEnvironment, ReachEnv):
     x, y, z [m].
 
     **Reward**: that of the reward type, and the problem's ``collision`` (-1 by default) if a
-    move was refused. ``compute_reward(achieved_goal, desired_goal, info)`` returns it for one pair
-    of goals or for many, as hindsight replay needs it. It depends on the goals and on
-    ``info["collision"]`` only; ``compute_terminated`` and ``compute_truncated`` on the goals.
+    move was refused. ``compute_reward(achieved_goal, desired_goal, info)`` returns it for one or
+    many pairs of goals, from these and ``info["collision"]`` only; ``compute_terminated`` and
+    ``compute_truncated`` depend on the goals.
 
     **End**: terminated when the tool is within the tolerance of the goal; truncated at the
-    horizon. A move that would touch something is refused, the arm stays where it is, and the
-    episode goes on. An end by contact would not follow from the goals, and would reward giving up.
+    horizon. A move that would touch something is refused, the arm stays, and the episode goes on:
+    an end by contact would not follow from the goals, and would reward giving up.
     ``kinarm-eval`` goes by the rules of `ReachEnv`, where contact ends an episode.
 
     **Info**: that of `ReachEnv`, without reward terms; ``collision`` and ``contact`` are about
@@ -205,7 +204,7 @@ class ReachGoalVectorEnv(GoalEnvironment, ReachVectorEnv):
 
 
 def _collided(info: Any) -> NDArray[np.bool_]:
-    """Whether infos tell of a collision; one of a step, of a batch, or a sequence of them."""
+    """Whether infos, of a step, a batch or a sequence, tell of collisions."""
     if isinstance(info, Mapping):
         return np.asarray(info.get("collision", False))
     return np.array([each.get("collision", False) for each in info], dtype=bool)
@@ -215,6 +214,5 @@ def _distance(first: ArrayLike, second: ArrayLike) -> Array:
     """Distances between points, shape (..., 3) each."""
     apart = np.asarray(first, dtype=np.float64) - np.asarray(second, dtype=np.float64)
     squares = apart**2
-    # Term by term, so that the sum does not depend on how many points there are.
-    distance: Array = np.sqrt(squares[..., 0] + squares[..., 1] + squares[..., 2])
-    return distance
+    # Term by term: the sum does not depend on the number of points.
+    return np.sqrt(squares[..., 0] + squares[..., 1] + squares[..., 2])

@@ -12,7 +12,7 @@ from kinarm.errors import finite_array
 from kinarm.problem import ProblemLike
 
 FIRST_ROW = np.zeros(1, dtype=np.int64)
-"""The only row of a batch of one."""
+"""The row of a batch of one."""
 
 
 class ReachEnv(ArmEnvironment, gymnasium.Env[Any, Array]):
@@ -23,8 +23,8 @@ class ReachEnv(ArmEnvironment, gymnasium.Env[Any, Array]):
     problem : ReachProblem, str or Path
         ``"left"``, ``"right"``, ``"both"``, a problem file, or a problem.
     render_mode : {"rgb_array", "human"}, optional
-        What `render` returns: a picture, or nothing, while a page in the browser follows the arm.
-        Only films, by Gymnasium's ``RecordVideo``, need the extra ``render``.
+        What `render` returns: a picture, or nothing, while a browser's page follows the arm. Films,
+        by Gymnasium's ``RecordVideo``, need the extra ``render``.
     width, height : int
         Size of pictures [pixels].
     camera : kinarm.viewer.Camera, optional
@@ -40,7 +40,7 @@ class ReachEnv(ArmEnvironment, gymnasium.Env[Any, Array]):
     **Action** (n = number of actuated joints, 5 for the shipped arms), ``Box(-1, 1, (n,))``:
     fraction of each joint's velocity limit during one time step of 0.02 s. At full speed the joints
     of the default arm move 7, 7, 8, 9 and 9 degrees a step. Larger actions are clipped; float64 is
-    accepted and not rounded.
+    not rounded.
 
     **Observation** (6 + 7 joints, 48 for the shipped arms), world frame with z up:
 
@@ -53,20 +53,20 @@ class ReachEnv(ArmEnvironment, gymnasium.Env[Any, Array]):
     30-47 position of each joint frame x, y, z                   m
     ===== ====================================================== ====
 
-    Quaternions are composed along the chain, so they have no sign flips over the joint range.
+    Quaternions are composed along the chain, so they do not flip signs.
 
     **Reward**: sum of the terms ``reward_progress`` (metres by which the tool came closer),
     ``reward_closer`` (0, for every step closer), ``reward_step`` (0), ``reward_collision`` (-1
     when a move touches something) and ``reward_success`` (0), with the default weights in
     brackets; see `kinarm.RewardWeights`.
 
-    **Start**: each actuated joint uniform within its limits, rejected until the arm touches
-    nothing and the tool is farther from the goal than the tolerance. Goals are uniform over the
-    regions of the task. ``reset(options={"start": q, "goal": p})`` sets either.
+    **Start**: each actuated joint uniform within its limits, until the arm touches nothing and the
+    tool is farther from the goal than the tolerance. Goals are uniform over the task's regions.
+    ``reset(options={"start": q, "goal": p})`` sets either.
 
     **End**: terminated when the tool is within 0.05 m of the goal, or when a move would touch the
-    ground, an obstacle or the arm itself (the move is refused); truncated after 64 steps. After
-    that nothing moves until `reset`: steps have the reward 0, and Gymnasium warns.
+    ground, an obstacle or the arm itself (the move is refused); truncated after 64 steps. Then
+    nothing moves until `reset`: steps have the reward 0, and Gymnasium warns.
 
     **Info**: ``distance`` [m]; and after a step ``success`` and, the same, ``is_success``;
     ``collision``; ``contact``, the number of the two bodies that would have touched, whose names
@@ -120,18 +120,18 @@ class ReachEnv(ArmEnvironment, gymnasium.Env[Any, Array]):
         return self._observation(episode), *answer, self._info(result)
 
     def render(self) -> Any:
-        """Take a picture of the arm; see ``render_mode``."""
+        """Take a picture of the arm (``render_mode``)."""
         _ = self.episodes  # refuses if there are none
         pictures = self._pictures.render()
         return pictures and pictures[0]
 
     def close(self) -> None:
-        """Close the live page, if there is one; nothing can be done afterwards."""
+        """Close the live page, if any; nothing can be done afterwards."""
         self.closed = True
         self._pictures.close()
 
     def _rest(self, episode: Episodes, result: StepResult) -> None:
-        """Let the result of a step after the end, in which nothing moved, tell of that again."""
+        """Let a step after the end tell of the end again."""
         gymnasium.logger.warn(
             "step() was called although the episode is over: call reset() first. "
             "Nothing moves until then, and rewards are 0."

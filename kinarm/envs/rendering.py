@@ -1,4 +1,4 @@
-"""Pictures of the arms of an environment, and a live page that follows them."""
+"""Pictures of an environment's arms, and a live page."""
 
 import math
 import webbrowser
@@ -25,15 +25,15 @@ RENDER_MODES = ("rgb_array", "human")
 OUTCOMES = {SUCCESS: "success", COLLISION: "collision", TRUNCATED: "truncated"}
 
 FULL_SIZE = 4
-"""Up to so many arms have pictures of the full size; more share the area that these take."""
+"""Largest number of arms with full-size pictures; more share their area."""
 
 
 class Pictures(tuple[Picture, ...]):
-    """Pictures of all arms, of one size, as Gymnasium expects them of a batch."""
+    """Pictures of all arms, of one size, as in Gymnasium."""
 
     @property
     def tiled(self) -> Picture:
-        """All in one picture, row by row from the upper left; empty tiles are white."""
+        """All in one picture, row by row; empty tiles are white."""
         height, width = self[0].shape[:2]
         columns = math.ceil(math.sqrt(len(self)))
         rows = math.ceil(len(self) / columns)
@@ -46,21 +46,20 @@ class Pictures(tuple[Picture, ...]):
 class EnvPictures:
     """Pictures of the arms of an environment.
 
-    Nothing is drawn, imported or built before a picture is needed.
+    Nothing is drawn or imported before it is needed.
 
     Parameters
     ----------
     simulator : Simulator
-        Simulator of the environment.
+        Of the environment.
     mode : str, optional
-        One of `RENDER_MODES`; with None, all calls return at once.
+        One of `RENDER_MODES`; with None, nothing happens.
     num_envs : int
         Number of arms.
     width, height : int
-        Size of a picture [pixels]. More than four arms share the area of four: 64 have pictures
-        of a quarter of the width and height.
+        Size of a picture [pixels]. More than four arms share the area of four.
     camera : Camera, optional
-        Where pictures are taken from; as the replay page does by default.
+        Place of the camera; that of the replay page by default.
     """
 
     def __init__(
@@ -92,7 +91,7 @@ class EnvPictures:
         self._begun: Episodes
 
     def begin(self, rows: NDArray[np.int64], episodes: Episodes) -> None:
-        """Take note of the episodes that some arms begin."""
+        """Note the episodes that some arms begin."""
         if self.mode is None:
             return
         self._begun = episodes
@@ -103,7 +102,7 @@ class EnvPictures:
             self._live_stage().begin(episodes.q[0], episodes.goal[0])
 
     def step(self, episodes: Episodes) -> None:
-        """Take note that all arms moved, or rested because their episode is over."""
+        """Note that all arms moved, or rested after their episode."""
         if self.mode is None:
             return
         self._begun = episodes
@@ -120,7 +119,7 @@ class EnvPictures:
             stage.pace(self._simulator.problem.stepping.time_step)
 
     def __getstate__(self) -> dict[str, Any]:
-        """Copies draw with a renderer, and on a page, of their own."""
+        """Copies have their own renderer and page."""
         return {**self.__dict__, "_renderer": None, "_stage": None}
 
     def close(self) -> None:
@@ -130,7 +129,7 @@ class EnvPictures:
         self._stage = self._renderer = None
 
     def render(self) -> Pictures | None:
-        """A picture of each arm, if the mode says so."""
+        """A picture of each arm, in the mode for it."""
         if self.mode != "rgb_array":
             return None
         if self._renderer is None:
@@ -157,7 +156,7 @@ class EnvPictures:
         return self._stage
 
     def _way(self, row: int) -> tuple[NDArray[np.float64], str | None]:
-        """Where the tool of an arm has been, shape (n, 3) [m], and how the episode ended."""
+        """The tool's way of an arm, shape (n, 3) [m], and how the episode ended."""
         outcome = OUTCOMES.get(int(self._begun.status[row]))
         return self._traces[row, : self._begun.steps[row] + 1], outcome
 

@@ -16,10 +16,10 @@ from kinarm.problem import ProblemLike
 
 
 class ReachVectorEnv(ArmEnvironment, VectorEnv[Any, Array, NDArray[Any]]):
-    """A native batch of `ReachEnv`: all arms are stepped by one call of the compiled simulator.
+    """A native batch of `ReachEnv`, stepped by one call of the compiled simulator.
 
-    Sub-environment i behaves like a `ReachEnv` reset with ``seed + i``. Spaces, rewards, endings
-    and infos are those of `ReachEnv`, batched as Gymnasium batches them.
+    Sub-environment i behaves like a `ReachEnv` reset with ``seed + i``. Spaces, rewards, ends and
+    infos are those of `ReachEnv`, batched as in Gymnasium.
 
     Parameters
     ----------
@@ -28,16 +28,16 @@ class ReachVectorEnv(ArmEnvironment, VectorEnv[Any, Array, NDArray[Any]]):
     problem : ReachProblem, str or Path
         As for `ReachEnv`.
     autoreset_mode : AutoresetMode or str
-        ``NextStep`` (default, as in Gymnasium): the step after the end of an episode begins the
-        next one and ignores its action. ``SameStep``: an episode that ends is replaced at once;
-        its last observation and info are in ``final_obs`` and ``final_info``. ``Disabled``: an
-        arm rests until ``reset(options={"reset_mask": mask})``.
+        ``NextStep`` (default, as in Gymnasium): the step after an episode's end begins the next one
+        and ignores its action. ``SameStep``: a finished episode is replaced at once; its last
+        observation and info are in ``final_obs`` and ``final_info``. ``Disabled``: an arm rests
+        until ``reset(options={"reset_mask": mask})``.
     threads : int, optional
         As for `kinarm.Simulator`.
     render_mode, width, height, camera, observation_dtype
-        As for `ReachEnv`; `render` returns as many pictures as there are arms.
+        As for `ReachEnv`; `render` returns a picture per arm.
     max_episode_steps : int, optional
-        Another name of the horizon, which Gymnasium uses.
+        Gymnasium's name of the horizon.
     **overrides
         As for `ReachEnv`.
     """
@@ -93,8 +93,8 @@ class ReachVectorEnv(ArmEnvironment, VectorEnv[Any, Array, NDArray[Any]]):
     ) -> tuple[Observations, dict[str, Any]]:
         """Begin episodes; see `ReachEnv.reset`.
 
-        ``options`` may hold ``reset_mask``, a boolean array of shape (num_envs,), to reset only
-        some, and one ``start`` or ``goal`` for all.
+        ``options`` may hold ``reset_mask``, a boolean array, shape (num_envs,), of arms to reset,
+        and one ``start`` or ``goal`` for all.
         """
         self._check_open()
         chosen = dict(options or {})
@@ -104,10 +104,9 @@ class ReachVectorEnv(ArmEnvironment, VectorEnv[Any, Array, NDArray[Any]]):
             if seeds[row] is not None:
                 self._queues.seed(row, np.random.default_rng(seeds[row]))
         episodes = self._begin(rows, chosen)
-        distance = np.zeros(self.num_envs)
-        distance[rows] = episodes.distance[rows]
         mask = np.zeros(self.num_envs, dtype=bool)
         mask[rows] = True
+        distance = np.where(mask, episodes.distance, 0.0)
         shown = self.interface.observe(episodes.observation)
         return shown, {"distance": distance, "_distance": mask}
 
@@ -125,7 +124,7 @@ class ReachVectorEnv(ArmEnvironment, VectorEnv[Any, Array, NDArray[Any]]):
         reward, terminated, truncated = self.interface.step_outcome(episodes, result)
         self._pictures.step(episodes)
         self._find_contacts(episodes, result)
-        # Infos as rows of a few tables, which are split at once where episodes are replaced.
+        # Infos are rows of tables, which are split at once where episodes are replaced.
         tables = result.numbers[self._numbers], result.flags[1:], result.contact[None]
         if self.autoreset_mode is AutoresetMode.SAME_STEP:
             infos = self._with_finals(episodes, tables, terminated | truncated)
@@ -138,18 +137,18 @@ class ReachVectorEnv(ArmEnvironment, VectorEnv[Any, Array, NDArray[Any]]):
         return self.interface.observe(episodes.observation), reward, terminated, truncated, infos
 
     def render(self) -> Any:
-        """Take a picture of every arm; see ``render_mode``."""
+        """Take a picture of every arm (``render_mode``)."""
         _ = self.episodes  # refuses if there are none
         return self._pictures.render()
 
     def close_extras(self, **_: Any) -> None:
-        """Close the live page, if there is one."""
+        """Close the live page, if any."""
         self._pictures.close()
 
     def _named(
         self, tables: tuple[NDArray[Any], ...], told: NDArray[np.bool_]
     ) -> dict[str, NDArray[Any]]:
-        """Name the rows of the tables, and add the mask of the arms of which they tell."""
+        """Name the rows of the tables, and add the mask of their arms."""
         infos = dict(zip(self._told, chain(*tables, repeat(told)), strict=False))
         infos["is_success"], infos["_is_success"] = infos["success"], told
         return infos
@@ -157,7 +156,7 @@ class ReachVectorEnv(ArmEnvironment, VectorEnv[Any, Array, NDArray[Any]]):
     def _with_finals(
         self, episodes: Episodes, tables: tuple[NDArray[Any], ...], over: NDArray[np.bool_]
     ) -> dict[str, Any]:
-        """Infos of a step, after which episodes that are over are replaced."""
+        """Infos of a step; then episodes that are over are replaced."""
         rows = over.nonzero()[0]
         if not rows.size:
             return self._named(tables, ~over)
@@ -177,7 +176,7 @@ class ReachVectorEnv(ArmEnvironment, VectorEnv[Any, Array, NDArray[Any]]):
         """Begin new episodes and report their distance."""
         self._begin(rows)
         infos["distance"][rows] = episodes.distance[rows]
-        infos["_distance"] = infos["_distance"].copy()  # which is no longer that of the others
+        infos["_distance"] = infos["_distance"].copy()  # the others' stays
         infos["_distance"][rows] = True
 
     def _masked_rows(self, mask: object) -> NDArray[np.int64]:

@@ -1,18 +1,18 @@
 """Compiled kernels: whole episodes, each step proven free of contact or left to Coal.
 
-Kernels that Python calls name their parameters. Their helpers (`inlined`, `helper`) share these
-arguments, whose fields go by their own names where a helper takes them apart:
+Kernels that Python calls document their parameters. Their helpers (`inlined`, `helper`) share these
+arguments and the names of their fields:
 
 chain, shapes, rules, control, episodes
     `Chain`, `ContactShapes`, `Rules`, `Control` and `Episodes`.
 first, last : int
-    Range of rows to work on.
+    Range of rows.
 row, e : int
-    Row of the arrays of a batch: which configuration or episode.
+    Row in the arrays of a batch: which configuration or episode.
 pair : int
-    Row of ``pairs``: which two bodies.
+    Row of ``pairs``.
 poses : ndarray, shape (n_joints + 1, POSE)
-    Forward kinematics: row 0 is the world, row k the frame of the k-th joint.
+    Forward kinematics: row 0 is the world, row k the frame of joint k.
 """
 
 import numba
@@ -20,7 +20,7 @@ import numba
 from kinarm.errors import KinarmError
 
 TESTED = (0, 62), (0, 68)
-"""First and last version of Numba whose compiler the kernels are known to work with."""
+"""First and last version of Numba that is known to work."""
 
 if not TESTED[0] <= numba.version_info.short <= TESTED[1]:
     raise KinarmError(

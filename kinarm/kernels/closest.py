@@ -1,8 +1,7 @@
 """The two closest bodies of a configuration and their closest points.
 
-The distance of two rounded polytopes is found by the algorithm of Gilbert, Johnson and Keerthi,
-which looks for the point closest to the origin of all differences of a point of the one and one
-of the other.
+For rounded polytopes, the algorithm of Gilbert, Johnson and Keerthi finds the point closest to the
+origin of all differences of their points.
 """
 
 import math
@@ -18,32 +17,32 @@ from kinarm.kernels.kinematics import POSE, forward_kinematics, rotated_back, to
 from kinarm.kernels.planes import lowest_corner
 
 CORNERS_TRIED = 64
-"""Corners after which a distance is taken as it is."""
+"""Corners at which a distance is taken as it is."""
 
 PRECISION = 1e-11
-"""By how much a distance may be too large [m]."""
+"""Largest excess of a distance [m]."""
 
 OVERLAPPING = 1e-8
-"""Distance below which polytopes, their rounding apart, count as overlapping [m]."""
+"""Distance below which polytopes, without rounding, overlap [m]."""
 
 
 class Bodies(NamedTuple):
-    """Bodies as rounded polytopes, and the pairs of them that are tested.
+    """Bodies as rounded polytopes, and their tested pairs.
 
     Attributes
     ----------
     link : ndarray of int, shape (n,)
-        Joint frame that carries a body; 0 is the world.
+        Joint frame of a body; 0 is the world.
     span : ndarray of int, shape (n, 2)
         Its first corner, and the one after its last.
     corners : ndarray, shape (n_corners, 3)
-        Corners in the joint frame [m]; of a half-space, its outer normal alone.
+        Corners in the joint frame [m]; of a half-space, its outer normal.
     rounding : ndarray, shape (n,)
-        Radius by which the hull of the corners is widened [m]; of a half-space, its offset.
+        Radius that widens the hull of the corners [m]; of a half-space, its offset.
     flat : ndarray of bool, shape (n,)
         Whether it is a half-space.
     exact : ndarray of bool, shape (n,)
-        Whether it is the shape, rather than encloses it.
+        Whether it equals the shape.
     balls : ndarray, shape (n, 4)
         Centre and radius of a ball about the body [m].
     pairs : ndarray of int, shape (n_pairs, 2)
@@ -62,7 +61,7 @@ class Bodies(NamedTuple):
 
 @inlined
 def lowest_in_world(bodies: Bodies, body: int, poses: Array, x: float, y: float, z: float) -> int:
-    """Row of the corner of a body that lies lowest along a vector of the world."""
+    """Row of a body's corner that is lowest along a vector of the world."""
     x, y, z = rotated_back(poses, bodies.link[body], x, y, z)
     return lowest_corner(bodies.corners, bodies.span, body, x, y, z)
 
@@ -76,7 +75,7 @@ def corner_at(bodies: Bodies, body: int, corner: int, poses: Array) -> Vector:
 
 @inlined
 def least_distance(bodies: Bodies, first: int, second: int, poses: Array) -> float:
-    """Lower bound of the distance of two bodies, by the balls about them [m]."""
+    """Lower bound of two bodies' distance, by balls about them [m]."""
     a, b = bodies.balls[first], bodies.balls[second]
     x, y, z = to_world(poses, bodies.link[first], a[0], a[1], a[2])
     if bodies.flat[second]:
@@ -90,7 +89,7 @@ def least_distance(bodies: Bodies, first: int, second: int, poses: Array) -> flo
 
 @inlined
 def above_plane(bodies: Bodies, first: int, second: int, poses: Array, points: Array) -> float:
-    """Distance of a body from a half-space, and where they are closest."""
+    """Distance of a body from a half-space, and the closest points."""
     normal = bodies.corners[bodies.span[second, 0]]
     nx, ny, nz = normal[0], normal[1], normal[2]
     corner = lowest_in_world(bodies, first, poses, nx, ny, nz)
@@ -111,13 +110,12 @@ def between(
     simplex: Array,
     points: Array,
 ) -> float:
-    """Distance of two bodies, and where they are closest; minus infinity if polytopes overlap.
+    """Distance of two bodies, and the closest points; minus infinity if polytopes overlap.
 
-    ``simplex``, shape (4, 9), is work space: differences of corners, and the corners that they are
-    of.
+    ``simplex``, shape (4, 9), is work space for differences of corners, and those corners.
     """
     size, norm, x, y, z = 0, math.inf, 0.0, 0.0, 1.0
-    # Walk towards the difference of two points of the bodies that is closest to the origin.
+    # Walk towards the difference of two points that is closest to the origin.
     for _ in range(CORNERS_TRIED):
         low = lowest_in_world(bodies, first, poses, x, y, z)
         high = lowest_in_world(bodies, second, poses, -x, -y, -z)
@@ -135,7 +133,7 @@ def between(
         if shorter >= norm:
             break
         norm = shorter
-    # The closest points are the same combinations of the corners that the differences are of.
+    # The closest points combine their corners like the differences.
     weights = (1.0, 0.0, 0.0)
     if size == 2:
         here, there = of_segment(simplex, 0, 1)
@@ -148,7 +146,7 @@ def between(
         for k in range(3):
             points[0, k] += weights[i] * simplex[i, 3 + k]
             points[1, k] += weights[i] * simplex[i, 6 + k]
-    # Shift them from the polytopes to the surfaces of the rounded bodies.
+    # Shift them to the surfaces of the rounded bodies.
     inner, outer = bodies.rounding[first] / norm, bodies.rounding[second] / norm
     for k in range(3):
         normal = x if k == 0 else y if k == 1 else z
@@ -168,20 +166,20 @@ def closest_pairs(
     nearest: NDArray[np.int64],
     points: Array,
 ) -> None:
-    """Find the closest pair at some rows of the configurations.
+    """Find the closest pair of some configurations.
 
     Parameters
     ----------
     first, last, chain, bodies
-        Range of the rows, the arm, and what is measured.
+        Range of the rows, the arm, and its surroundings.
     configurations : ndarray, shape (n, n_joints)
         Joint positions [rad or m].
     bounds : ndarray, shape (n, n_pairs)
-        Where lower bounds of the distances go, that of the closest pair being its distance [m].
+        Where lower bounds of distances go; that of the closest pair is its distance [m].
     nearest : ndarray of int, shape (n,)
-        Where the closest pair goes; -1 if polytopes overlap or are not the shapes themselves.
+        Where the closest pair goes; -1 if polytopes overlap or differ from the shapes.
     points : ndarray, shape (n, 2, 3)
-        Where the two points go at which its bodies are closest [m].
+        Where its two closest points go [m].
     """
     poses = np.zeros((configurations.shape[1] + 1, POSE))
     simplex, found = np.empty((4, 9)), np.empty((2, 3))
@@ -189,7 +187,7 @@ def closest_pairs(
     known = np.empty(n_pairs, dtype=np.bool_)
     for row in range(first, last):
         forward_kinematics(chain, configurations, row, poses)
-        # Bound all distances from below, then measure those of the least bounds.
+        # Bound all distances from below, then measure the least ones.
         for pair in range(n_pairs):
             one, other = bodies.pairs[pair, 0], bodies.pairs[pair, 1]
             bounds[row, pair] = least_distance(bodies, one, other, poses)

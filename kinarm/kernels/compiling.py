@@ -1,12 +1,11 @@
 """How kernels are compiled: without the GIL and without reordering of floating-point operations.
 
-Numba optimises every function and makes machine code of it, though code of helpers that only
-kernels call reaches these as LLVM code and is optimised once more in there. Here a helper is only
-simplified before it is linked. What this module takes from within Numba, and `records` and `lanes`,
-is all that kinarm does.
+Numba makes machine code of every function, though helpers reach kernels as LLVM code and are
+optimised there again. Here helpers are only simplified before they are linked. Only this module,
+`records` and `lanes` use Numba's internals.
 
-Numba takes machine code on disk for fresh as long as the file that defines a kernel is as it was.
-Helpers and constants from other files are compiled in, too: here the key is a hash of all of them.
+Numba trusts cached machine code as long as a kernel's own file is unchanged. Here the key is a hash
+of all files whose helpers and constants are compiled in.
 """
 
 import gc
@@ -35,12 +34,12 @@ Function = TypeVar("Function", bound=Callable[..., Any])
 
 
 def kernel(function: Function) -> Function:
-    """Compile a function that Python calls, into the disk cache where there can be one."""
+    """Compile a function for Python, into the disk cache if possible."""
     return _called_by_python(function)
 
 
 def lean_kernel(function: Function) -> Function:
-    """Compile such a function that works in lanes and allocates nothing, in less time."""
+    """Compile such a function that works in lanes and allocates nothing, faster."""
     return _called_by_python(function, _nrt=False, pipeline_class=LeanCompiler)
 
 
@@ -58,17 +57,17 @@ def _called_by_python(function: Function, **more: Any) -> Function:
 
 
 def inlined(function: Function) -> Function:
-    """Compile a helper that allocates nothing: several times faster without reference counts."""
+    """Compile a helper that allocates nothing, without reference counts."""
     return _linked(function, forceinline=True, _nrt=False)
 
 
 def helper(function: Function) -> Function:
-    """Compile a long helper that allocates nothing: called, it is compiled only once."""
+    """Compile a long helper that allocates nothing, to be called."""
     return _linked(function, _nrt=False)
 
 
 def _linked(function: Function, **more: Any) -> Function:
-    """Compile what only kernels call, with no way there from Python, which would crash."""
+    """Compile what only kernels call; calls from Python would crash."""
     options: dict[str, Any] = {
         "error_model": "numpy",
         "no_cpython_wrapper": True,
@@ -79,7 +78,7 @@ def _linked(function: Function, **more: Any) -> Function:
     find = dispatcher.get_call_template
 
     def get_call_template(arguments: list[Any], keywords: dict[str, Any]) -> Any:
-        # Once for all numbers: by itself, Numba compiles a helper anew for each literal.
+        # Numba by itself compiles a helper anew for each literal.
         named = {name: types.unliteral(kind) for name, kind in keywords.items()}
         return find([types.unliteral(kind) for kind in arguments], named)
 
@@ -99,14 +98,14 @@ WITHOUT = {
     "InlineOverloads",
     "NopythonRewrites",
 }
-"""Numba's passes for what kernels do without: contexts, closures, messages of errors, functions
-that are spliced in, literals, and expressions of whole arrays. They take a twelfth of the time."""
+"""Passes of Numba for what kernels lack, such as contexts, closures, error messages, literals and
+expressions of whole arrays. They take a twelfth of the time."""
 
 
 class LeanLibrary(JITCodeLibrary):
-    """Code of a kernel in lanes, optimised once; Numba does so twice, to prune reference counts.
+    """Code of a kernel in lanes, optimised once: it has no reference counts to prune.
 
-    LLVM does not look for loops to make vectors of: lanes are vectors already.
+    LLVM makes no vectors of loops: lanes are vectors.
     """
 
     def __init__(self, codegen: Any, name: str) -> None:
@@ -119,43 +118,43 @@ class LeanLibrary(JITCodeLibrary):
 
 
 class LinkedLibrary(JITCodeLibrary):
-    """Code to be linked into kernels, which never becomes machine code of its own."""
+    """Code to be linked into kernels, without machine code of its own."""
 
     @property
     def codegen(self) -> "LinkedLibrary":
-        """The library itself, which is told of the environment of the function, and leaves it."""
+        """The library itself, to be told the function's environment."""
         return self
 
     def set_env(self, name: str, environment: object) -> None:
-        """Leave the environment alone; Python objects, which it would hold, are not for helpers."""
+        """Ignore the environment: helpers have no Python objects."""
 
     def finalize(self) -> None:
-        """Link in what is called, and leave optimisation and machine code to kernels."""
+        """Link in called functions; kernels optimise and make machine code."""
         for library in dict.fromkeys(self._linking_libraries):
             self._final_module.link_in(library._get_module_for_linking(), preserve=True)
         self._final_module.verify()
         self._finalized = True
 
     def get_pointer_to_function(self, _: str) -> int:
-        """Finalize; there is no machine code to point to."""
+        """Finalize; there is no machine code."""
         self._ensure_finalized()
         return 0
 
 
 class KernelCompiler(CompilerBase):
-    """Numba's compiler, without collecting garbage: it keeps nearly all that it makes."""
+    """Numba's compiler, which keeps nearly all, without garbage collection."""
 
     library: type[JITCodeLibrary] | None = None
     """Instead of Numba's own."""
 
     def define_pipelines(self) -> list[Any]:
-        """Take those of Numba's passes that do something for kernels."""
+        """Take Numba's passes that do something for kernels."""
         passes = DefaultPassBuilder.define_nopython_pipeline(self.state)
         passes.passes = [each for each in passes.passes if each[0].__name__ not in WITHOUT]
         return [passes]
 
     def compile_extra(self, func: Callable[..., Any]) -> Any:
-        """Compile a function, and the helpers that it calls."""
+        """Compile a function and its helpers."""
         if self.library is not None:
             codegen = self.state.targetctx.codegen()
             self.state.library = self.library(codegen, func.__qualname__)
@@ -176,19 +175,19 @@ class LeanCompiler(KernelCompiler):
 
 
 class HelperCompiler(KernelCompiler):
-    """Compiles what only kernels call, into a `LinkedLibrary`."""
+    """Compiles a helper into a `LinkedLibrary`."""
 
     library = LinkedLibrary
 
 
 class KernelCache(FunctionCache):
-    """Machine code of a kernel on disk; if it is damaged or cannot be kept, this costs only time.
+    """A kernel's machine code on disk; damage costs only time.
 
-    Two processes with the same sources, and the same versions of Numba and llvmlite, share it.
+    Processes with the same sources and versions of Numba and llvmlite share it.
     """
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
-        """Look machine code up; None if there is none or what there is cannot be read."""
+        """Look machine code up; None if it is missing or damaged."""
         try:
             self._cache_file._source_stamp = self._key
             return super().load_overload(sig, target_context)
@@ -198,13 +197,13 @@ class KernelCache(FunctionCache):
             return None
 
     def save_overload(self, sig: Any, data: Any) -> None:
-        """Keep machine code, if that is possible."""
+        """Keep machine code if possible."""
         with suppress(OSError):
             super().save_overload(sig, data)
 
     @cached_property
     def _key(self) -> str:
-        # Only now is all there that the kernel's module defines.
+        # The kernel's module is complete by now.
         return compiled_in(self._py_func.__module__)
 
 
@@ -212,9 +211,8 @@ class KernelCache(FunctionCache):
 def compiled_in(module: str) -> str:
     """Hash of what the kernels of a module are made of.
 
-    This is the source of the module and of all those whose helpers it takes, directly or not, and
-    of those that make them compile; and what these take from others: numbers, and the fields of
-    named tuples.
+    It covers the sources of the module, of all whose helpers it takes, directly or not, and of
+    those that compile them; from others, numbers and fields of named tuples.
     """
     parts: dict[str, object] = {"llvmlite": llvmlite.__version__}
     _collect(module, parts)
@@ -222,7 +220,7 @@ def compiled_in(module: str) -> str:
 
 
 def _collect(module: str, parts: dict[str, object]) -> None:
-    """Add what kernels of a module are made of, by its name."""
+    """Add what kernels of a module are made of."""
     source = Path(sys.modules[module].__file__ or "").read_bytes()
     parts[module] = hashlib.sha256(source).hexdigest()
     for name, value in vars(sys.modules[module]).items():

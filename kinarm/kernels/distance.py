@@ -1,7 +1,7 @@
 """Closest points of segments, boxes, simplices and hulls.
 
-Those of segments and boxes are found for a number or lanes. Of simplices of up to four corners, the
-point closest to the origin is found (Ericson, Real-Time Collision Detection).
+Segments and boxes are of numbers or lanes. In simplices of up to four corners, the point closest to
+the origin is found (Ericson, Real-Time Collision Detection).
 """
 
 import math
@@ -14,7 +14,7 @@ from kinarm.kernels.lanes import any_lane, select
 
 @inlined
 def between_segments(a: Vector, b: Vector, c: Vector, d: Vector) -> Vector:
-    """Vector from a point of the segment cd to one of ab, (nearly) the closest ones."""
+    """Vector from segment cd to ab, between (nearly) closest points."""
     ux, uy, uz = b[0] - a[0], b[1] - a[1], b[2] - a[2]
     vx, vy, vz = d[0] - c[0], d[1] - c[1], d[2] - c[2]
     rx, ry, rz = a[0] - c[0], a[1] - c[1], a[2] - c[2]
@@ -33,7 +33,7 @@ def between_segments(a: Vector, b: Vector, c: Vector, d: Vector) -> Vector:
 
 @inlined
 def turned_back(point: Vector, cosine: float, sine: float) -> Vector:
-    """Coordinates of a point, or a direction, along axes that are turned about z."""
+    """Coordinates of a point or direction along axes turned about z."""
     return cosine * point[0] + sine * point[1], cosine * point[1] - sine * point[0], point[2]
 
 
@@ -41,7 +41,7 @@ def turned_back(point: Vector, cosine: float, sine: float) -> Vector:
 def closest_to_box(a: Vector, b: Vector, lower: Vector, upper: Vector) -> float:
     """Where on the segment ab, from 0 to 1, it is (nearly) closest to a box.
 
-    By a safeguarded Newton iteration on the squared distance, which is convex along the segment.
+    A safeguarded Newton iteration on the squared distance, which is convex along it.
     """
     lx, ly, lz = lower
     hx, hy, hz = upper
@@ -90,7 +90,7 @@ def edge(simplex: Array, i: int, j: int) -> Vector:
 
 @inlined
 def of_segment(simplex: Array, i: int, j: int) -> tuple[float, float]:
-    """Weights of two corners in the closest point of the segment between them."""
+    """Weights of two corners in the closest point of their segment."""
     along = edge(simplex, i, j)
     length = along[0] * along[0] + along[1] * along[1] + along[2] * along[2]
     share = 0.0
@@ -130,7 +130,7 @@ def of_triangle(simplex: Array, i: int, j: int, k: int) -> Vector:
 
 @inlined
 def is_beyond(simplex: Array, i: int, j: int, k: int, other: int) -> bool:
-    """Whether the origin and the fourth corner are on different sides of a triangle."""
+    """Whether a triangle separates the origin from the fourth corner."""
     ab, ac = edge(simplex, i, j), edge(simplex, i, k)
     normal = (
         ab[1] * ac[2] - ab[2] * ac[1],
@@ -143,10 +143,9 @@ def is_beyond(simplex: Array, i: int, j: int, k: int, other: int) -> bool:
 
 @helper
 def shrink(simplex: Array, size: int) -> tuple[int, float, float, float]:
-    """Drop the corners that the closest point does not depend on; return how many stay, and it.
+    """Drop corners not needed for the closest point; return their number, and it.
 
-    What a row of the simplex holds after its corner stays with that.
-    A tetrahedron that holds the origin stays as it is.
+    The rest of a corner's row stays with it. A tetrahedron around the origin stays as it is.
     """
     a, b, c, d = 1.0, 0.0, 0.0, 0.0
     if size == 2:
@@ -186,22 +185,20 @@ def shrink(simplex: Array, size: int) -> tuple[int, float, float, float]:
 
 
 ITERATIONS = 64
-"""Corners that are tried for a point before its distance is taken as it is."""
+"""Corners that are tried for a point."""
 
 PRECISION = 1e-9
-"""By how much a distance may be too large [m]."""
+"""Largest excess of a distance [m]."""
 
 
 @kernel
 def distances_from_hull(corners: Array, points: Array, distances: Array) -> None:
-    """Bound the distances of points from the hull of corners from above.
-
-    Each is that of a point of the hull, (nearly) the closest one.
+    """Bound distances of points from the hull of corners, by (nearly) closest points.
 
     Parameters
     ----------
     corners, points : ndarray, shape (n_corners, 3) and (n, 3)
-        What the hull is of, and the points [m].
+        Corners of the hull, and points [m].
     distances : ndarray, shape (n,)
         Where the bounds go [m].
     """

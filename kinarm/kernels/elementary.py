@@ -1,20 +1,20 @@
-"""Elementary functions of our own, for a number or lanes: the same bits on every machine.
+"""Elementary functions of numbers or lanes: the same bits on every machine.
 
-Polynomials and constants are the classic ones of the Cephes and FreeBSD mathematical libraries.
+Polynomials and constants are those of Cephes and FreeBSD's mathematical library.
 """
 
 from kinarm.kernels.compiling import inlined
 from kinarm.kernels.lanes import power_of_two, select
 
 HALF_PI = 1.57079632673412561417
-"""Half of pi, rounded to 33 bits: its products with small whole numbers are exact."""
+"""Half of pi in 33 bits: small multiples are exact."""
 HALF_PI_REST = 6.07710050650619224932e-11
 """Half of pi less `HALF_PI`."""
 QUARTERS = 0.63661977236758134308
 """2 / pi."""
 
 ROUNDING = 1.5 * 2.0**52
-"""Added to a number and taken away again, it leaves the nearest whole number."""
+"""Added and subtracted, it leaves the nearest whole number."""
 
 LOG_2 = 6.93145751953125e-1
 LOG_2_REST = 1.42860682030941723212e-6
@@ -23,13 +23,13 @@ LOG_2_INVERSE = 1.4426950408889634074
 
 @inlined
 def nearest_whole(x: float) -> float:
-    """Nearest whole number to one below 2^51; half-way ones go to the even one."""
+    """Nearest whole number, below 2^51; half-way ones go to the even one."""
     return (x + ROUNDING) - ROUNDING
 
 
 @inlined
 def sine_cosine(angle: float) -> tuple[float, float]:
-    """Sine and cosine of an angle of at most a million radians, to within 1e-15."""
+    """Sine and cosine of at most a million radians, to within 1e-15."""
     quarter = nearest_whole(angle * QUARTERS)
     x = (angle - quarter * HALF_PI) - quarter * HALF_PI_REST
     z = x * x
@@ -41,7 +41,7 @@ def sine_cosine(angle: float) -> tuple[float, float]:
     even = 2.48015872894767294178e-5 + z * (-2.75573143513906633035e-7 + z * even)
     even = 4.16666666666666019037e-2 + z * (-1.38888888888741095749e-3 + z * even)
     cosine = 1.0 - (0.5 * z - z * z * even)
-    # Which quarter turn it is, as -1/2, -1/4, 0, 1/4 or 1/2 of a whole one.
+    # Which quarter turn, as -1/2, -1/4, 0, 1/4 or 1/2 of a whole one.
     turn = 0.25 * quarter
     turn -= nearest_whole(turn)
     swapped = abs(abs(turn) - 0.25) < 0.125
@@ -55,7 +55,7 @@ def sine_cosine(angle: float) -> tuple[float, float]:
 
 @inlined
 def exponential(x: float) -> float:
-    """E to the power of a number between -700 and 700, to within 2e-16 of itself."""
+    """E to a power between -700 and 700, to within 2e-16 of itself."""
     doublings = nearest_whole(x * LOG_2_INVERSE)
     x = (x - doublings * LOG_2) - doublings * LOG_2_REST
     z = x * x

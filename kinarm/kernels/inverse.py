@@ -1,8 +1,7 @@
-"""Inverse kinematics: all configurations that bring the tool where it is wanted, from many seeds.
+"""Inverse kinematics: all configurations for the wanted tool, from many seeds.
 
-A seed is moved by damped Newton steps (Levenberg 1944, Marquardt 1963) whose damping shrinks with
-the square of the error, so that they converge quadratically. Eight seeds move side by side in
-lanes; one that has ended makes room for the next.
+Seeds move by damped Newton steps (Levenberg 1944, Marquardt 1963), whose damping shrinks with the
+square of the error, so that they converge quadratically. Lanes take eight at a time.
 """
 
 import math
@@ -18,22 +17,22 @@ from kinarm.kernels.kinematics import POSE, forward_kinematics, point_jacobian, 
 from kinarm.kernels.lanes import LANES, any_lane, as_lanes, as_numbers, lane_bits, select
 
 PRECISION = 1e-10
-"""Error at which a seed has arrived: lengths as shares of the arm's reach, and angles [rad]."""
+"""Error at arrival: share of the arm's reach, and angle [rad]."""
 
 ITERATIONS = 48
-"""Steps after which a seed is given up."""
+"""Steps of a seed at most."""
 
 PATIENCE, PROGRESS = 20, 0.98
-"""Steps after which a seed is given up whose squared error shrinks no further than to a share."""
+"""Steps before a seed ends that no longer shrinks its squared error to this share."""
 
 DAMPING, LEAST_DAMPING = 0.1, 1e-12
-"""Of the squared error, what is added to the diagonal of J J^T; and what is added at least."""
+"""Added to the diagonal of J J^T: share of the squared error, and at least this."""
 
 HITS = 3
-"""Seeds that have to arrive at each solution before the search for isolated ones ends."""
+"""Arrivals at each solution before the search for isolated ones ends."""
 
 ROUNDING = 1e-9
-"""By how much a solution may lie beyond a limit, to which it is then moved [rad or m]."""
+"""How far a solution beyond a limit is moved to it [rad or m]."""
 
 TURN = 6.28318530717958647693
 
@@ -46,15 +45,15 @@ class Search(NamedTuple):
     tool : ndarray, shape (3,)
         Tool point in the last joint frame [m].
     axes : ndarray, shape (n_axes, 3)
-        Unit vectors of the last joint frame whose directions are wanted: none, one or three.
+        Unit vectors of the last joint frame whose directions are wanted; none, one or three.
     scale : float
         Inverse of the arm's reach [1/m].
     near : ndarray, shape (n_joints,)
-        First seed; where joints that are not moved rest, and by which whole turns are chosen.
+        First seed, where other joints rest and to which whole turns are closest.
     seeds : ndarray, shape (n_seeds, n)
-        Where further seeds lie between the limits of the first n joints, from 0 to 1.
+        Further seeds between the limits of the first n joints, from 0 to 1.
     least : int
-        Seeds that are tried before the search for isolated solutions may end; 0 if it may not.
+        Seeds before the search for isolated solutions may end; 0 if it may not.
     separation : float
         Least difference of two solutions in some joint [rad or m].
     """
@@ -70,9 +69,9 @@ class Search(NamedTuple):
 
 @inlined
 def orientation_error(axes: Array, poses: Array, wanted: Array, jacobian: Array) -> Vector:
-    """Vector about which the tool has to turn, as long as the angle where that is small [rad].
+    """Vector about which the tool has to turn, as long as a small angle is [rad].
 
-    With one axis, the Jacobian's last three rows lose what turns the tool about it.
+    With one axis, the Jacobian's last three rows lose turns about it.
     """
     n_axes, last = axes.shape[0], poses.shape[0] - 1
     zero = 0.0 * poses[last, 13]
@@ -92,7 +91,7 @@ def orientation_error(axes: Array, poses: Array, wanted: Array, jacobian: Array)
                 jacobian[5, k] -= along * az
     if n_axes == 3:
         wx, wy, wz, cosine = 0.5 * wx, 0.5 * wy, 0.5 * wz, 0.5 * (cosine - 1.0)
-    # From the sine of the angle to twice that of its half, which grows up to half a turn.
+    # From the sine of the angle to twice that of its half, which grows up to a half turn.
     longer = 1.0 / math.sqrt(max(0.5 + 0.5 * cosine, 1e-6))
     return longer * wx, longer * wy, longer * wz
 
@@ -113,7 +112,7 @@ def damped_step(jacobian: Array, error: Array, damping: float, square: Array, st
                 entry += jacobian[i, k] * jacobian[j, k]
             square[i, j] = entry
         square[i, i] += damping
-    # Below the diagonal the factor, above it the factor times the pivot.
+    # The factor below the diagonal, and times the pivot above it.
     for j in range(rows):
         inverse = 1.0 / square[j, j]
         for i in range(j + 1, rows):
@@ -145,9 +144,9 @@ def keep_new(
     hits: NDArray[np.int64],
     found: int,
 ) -> int:
-    """Add what a lane holds to the solutions found, unless it is there or out of the limits.
+    """Add a lane's configuration to the solutions, if it is new and within limits.
 
-    The first n joints move. Returns how many there are.
+    The first n joints move. Returns the number of solutions.
     """
     prismatic, lower, upper = chain.prismatic, chain.lower, chain.upper
     for k in range(configurations.shape[1]):
@@ -189,20 +188,20 @@ def solve_targets(
     configurations: Array,
     counts: NDArray[np.int64],
 ) -> None:
-    """Find the configurations at which the tool is where it is wanted, for rows of targets.
+    """Find the configurations of wanted tools, for rows of targets.
 
-    Of solutions that differ by whole turns, the one nearest to ``search.near`` is given.
+    Of solutions that differ by whole turns, the nearest to ``search.near`` is given.
 
     Parameters
     ----------
     first, last, chain, search
-        Range of the rows, the arm, and what is looked for.
+        Range of the rows, the arm, and the search.
     positions, directions : ndarray, shape (n_targets, 3) and (n_targets, n_axes, 3)
         Wanted tool points [m], and directions of the tool's axes.
     configurations : ndarray, shape (n_targets, most + 1, n_joints)
         Where solutions go [rad or m].
     counts : ndarray of int, shape (n_targets,)
-        Where it goes how many there are of each target.
+        Where the numbers of solutions go.
     """
     prismatic = chain.prismatic
     n_joints, (n_seeds, n) = configurations.shape[2], search.seeds.shape
@@ -218,19 +217,18 @@ def solve_targets(
     lower, upper = chain.lower[:n], chain.upper[:n]
     lowest, highest = np.empty(n), np.empty(n)
     for k in range(n):
-        # Solutions of a continuum are sought within the limits, isolated ones wherever they are.
+        # Solutions of a continuum are sought within the limits, isolated ones anywhere.
         turns = not prismatic[k] and (search.least > 0 or upper[k] - lower[k] >= TURN)
         lowest[k], highest[k] = (-math.inf, math.inf) if turns else (lower[k], upper[k])
     hits = np.zeros(most + 1, dtype=np.int64)
-    everything = (1 << LANES) - 1
     for target in range(first, last):
         for k in range(3):
             aim[k] = positions[target, k]
             for i in range(n_axes):
                 wanted[i, k] = directions[target, i, k]
-        found, tried, waiting, n_moving, free = 0, 0, 0, 0, everything
+        found, tried, waiting, n_moving, free = 0, 0, 0, 0, (1 << LANES) - 1
         while True:
-            # Put the next seeds into lanes that are free: first ``near``, then the others.
+            # Put the next seeds into free lanes: first ``near``, then the others.
             for lane in range(LANES):
                 if free >> lane & 1 and waiting < n_seeds + 1:
                     for k in range(n_joints):
@@ -242,7 +240,7 @@ def solve_targets(
                     waiting, n_moving, free = waiting + 1, n_moving + 1, free & ~(1 << lane)
             if n_moving == 0:
                 break
-            # Errors of position and orientation, and the Jacobian by which they change.
+            # Errors of position and orientation, and their Jacobian.
             forward_kinematics(chain, q, 0, poses)
             point = to_world(poses, n_joints, tool[0], tool[1], tool[2])
             point_jacobian(chain, poses, point, jacobian)
@@ -257,14 +255,14 @@ def solve_targets(
                 for i in range(3):
                     error[3 + i] = turn[i]
                     squared += turn[i] * turn[i]
-            # A damped Newton step, without the joints that it would push beyond a limit.
+            # A damped Newton step, without joints that it would push beyond a limit.
             arrived = squared <= PRECISION * PRECISION
             damping = DAMPING * squared + LEAST_DAMPING
             blocked = True
             while blocked:
                 damped_step(jacobian, error, damping, square, step)
                 blocked = take_out_blocked(q, lowest, highest, step, jacobian)
-            # Take out what has arrived, which may be a new solution, and what gets no further.
+            # Take out what has arrived, a solution that may be new, and what is stuck.
             stuck = (iteration[0] >= PATIENCE) & (squared > PROGRESS * before[0])
             ended = arrived | stuck | (iteration[0] >= ITERATIONS)
             before[0] = squared
@@ -276,7 +274,7 @@ def solve_targets(
                         row = configurations[target]
                         found = keep_new(numbers, lane, search, chain, n, row, hits, found)
             free |= ended_bits
-            # End as soon as there are enough solutions, or every one was found often enough.
+            # End with enough solutions, or when each was found often enough.
             if found == most:
                 break
             if search.least > 0 and tried >= search.least and found > 0:
@@ -296,10 +294,7 @@ LONGEST_STEP = 0.5
 
 @inlined
 def take_out_blocked(q: Array, lower: Array, upper: Array, step: Array, jacobian: Array) -> bool:
-    """Zero the Jacobian's columns of joints at a limit that would leave it; whether there is one.
-
-    The others then have to make up for them, which changes the step.
-    """
+    """Zero the Jacobian's columns of joints that would leave limits; tell if any."""
     blocked = False
     for k in range(step.shape[0]):
         outward = ((q[0, k] >= upper[k]) & (step[k] > 0.0)) | (
@@ -313,13 +308,12 @@ def take_out_blocked(q: Array, lower: Array, upper: Array, step: Array, jacobian
 
 
 @inlined
-def take_step(q: Array, lower: Array, upper: Array, step: Array) -> float:
-    """Move configurations by a step, within their limits; return its largest part [rad or m]."""
-    # Scaled down as a whole, a step keeps its direction, in which the tool nears the goal.
+def take_step(q: Array, lower: Array, upper: Array, step: Array) -> None:
+    """Move configurations by a step within the limits."""
+    # Scaled as a whole, a step keeps its direction.
     longest = 0.0 * step[0] + LONGEST_STEP
     for k in range(step.shape[0]):
         longest = max(longest, abs(step[k]))
     for k in range(step.shape[0]):
         moved = q[0, k] + LONGEST_STEP / longest * step[k]
         q[0, k] = min(max(moved, lower[k]), upper[k])
-    return longest

@@ -7,25 +7,25 @@ from kinarm.kernels.compiling import Array, Vector, helper, inlined, kernel
 from kinarm.kernels.elementary import sine_cosine
 
 POSE = 16
-"""Entries of a frame's pose: quaternion w x y z, rotation matrix by rows, position."""
+"""Entries of a pose: quaternion w x y z, rotation matrix, position."""
 
 
 @helper
 def forward_kinematics(chain: Chain, configurations: Array, row: int, poses: Array) -> None:
     """Fill in the world poses of all joint frames at a row of configurations [rad or m].
 
-    Quaternions are composed along the chain, so they are continuous in the joint positions.
+    Quaternions are composed along the chain, hence continuous in the joint positions.
     """
     prismatic, translation = chain.prismatic, chain.translation
     rotation, axis = chain.rotation, chain.axis
     for i in range(POSE):
         poses[0, i] = 1.0 if i == 0 or i == 4 or i == 8 or i == 12 else 0.0
     for k in range(configurations.shape[1]):
-        # The origin of the frame, in the one before.
+        # The frame's origin in the one before.
         c = k + 1
         tx, ty, tz = translation[k, 0], translation[k, 1], translation[k, 2]
         poses[c, 13], poses[c, 14], poses[c, 15] = to_world(poses, k, tx, ty, tz)
-        # The frame's turn about its axis, after its fixed rotation.
+        # The frame's turn about its axis after its fixed rotation.
         fw, fx, fy, fz = rotation[k, 0], rotation[k, 1], rotation[k, 2], rotation[k, 3]
         ax, ay, az = axis[k, 0], axis[k, 1], axis[k, 2]
         sine, cosine = 0.0, 1.0
@@ -39,7 +39,7 @@ def forward_kinematics(chain: Chain, configurations: Array, row: int, poses: Arr
             jx = fw * ux + fx * cosine + fy * uz - fz * uy
             jy = fw * uy - fx * uz + fy * cosine + fz * ux
             jz = fw * uz + fx * uy - fy * ux + fz * cosine
-        # Times the quaternion of the frame before; and the rotation matrix of the product.
+        # Times the quaternion before, and the product's rotation matrix.
         pw, px, py, pz = poses[k, 0], poses[k, 1], poses[k, 2], poses[k, 3]
         w = pw * jw - px * jx - py * jy - pz * jz
         x = pw * jx + px * jw + py * jz - pz * jy
@@ -96,10 +96,10 @@ def rotated_back(poses: Array, frame: int, x: float, y: float, z: float) -> Vect
 
 @inlined
 def point_jacobian(chain: Chain, poses: Array, point: Vector, jacobian: Array) -> None:
-    """Fill in how fast a point moves per unit speed of each of the first joints [m/rad, or m/m].
+    """Fill in a point's speed per unit speed of each of the first joints [m/rad, or m/m].
 
-    The point lies beyond them; it and the Jacobian are those of the world frame. A Jacobian of the
-    shape (6, n), rather than (3, n), also tells the angular velocities of the point's link.
+    It lies beyond them, and all is in the world. A Jacobian of the shape (6, n), rather than
+    (3, n), also has the angular velocities of the point's link.
     """
     prismatic, axis = chain.prismatic, chain.axis
     for k in range(jacobian.shape[1]):
@@ -127,19 +127,18 @@ def follow_frame(
     configurations: Array,
     filled: Array,
 ) -> None:
-    """Write where a frame is at some rows of the configurations, or how it moves.
+    """Write where a frame is at some configurations, or how it moves.
 
     Parameters
     ----------
     first, last, chain
         Range of the rows, and the arm.
     joint, placement : int and ndarray, shape (4, 4)
-        The joint that carries the frame, 0 is the world, and where it is in that one's frame [m].
+        The frame's joint, 0 for the world, and its place in the joint's frame [m].
     configurations : ndarray, shape (n, n_joints)
         Joint positions [rad or m].
     filled : ndarray, shape (n, 4, 4) or (n, 6, n_joints)
-        Where its poses in the world go [m]; or its Jacobians, of which columns of the joints beyond
-        the frame are left as they are.
+        Where its poses in the world go [m], or its Jacobians, up to the joint of the frame.
     """
     poses = np.zeros((configurations.shape[1] + 1, POSE))
     for row in range(first, last):

@@ -1,10 +1,9 @@
-"""Several episodes in one SIMD value: a type for kernels, with functions for numbers, too.
+"""Several episodes in one SIMD value: a type for kernels, and functions of it or numbers.
 
-A value of type ``lanes`` holds one number for each of `LANES` episodes. Arithmetic, comparisons,
-``min``, ``max``, ``abs`` and ``math.sqrt`` act on all of them at once, and numbers mix with
-lanes. Elements of an array that `as_lanes` viewed are such values. So a formula that is written
-once, without branches on values, serves a single episode and a block of them, with the same bits:
-nothing is reordered, and products and sums are not contracted.
+A value of type ``lanes`` holds a number for each of `LANES` episodes. Arithmetic, comparisons,
+``min``, ``max``, ``abs`` and ``math.sqrt`` act on all at once, and lanes mix with numbers. Elements
+of an array from `as_lanes` are such values. So formulas without branches on values serve single
+episodes and blocks, with the same bits: nothing is reordered or contracted.
 """
 
 import math
@@ -20,11 +19,11 @@ from numba.core.typing.templates import AbstractTemplate, Signature, infer_globa
 from numba.extending import intrinsic, lower_builtin, lower_cast, models, register_model
 
 LANES = 8
-"""Episodes in a value: as many doubles as the widest vector registers hold."""
+"""Episodes in a value: doubles of the widest vector registers."""
 
 FIRST = {"target": "cpu"}
-"""Lets Numba try how an operator acts on lanes before how it acts on whatever else: it asks what
-is specific to a target first."""
+"""Makes Numba try an operator on lanes before others: it asks what is specific to a target
+first."""
 
 NUMBERS = ir.VectorType(ir.DoubleType(), LANES)
 BITS = ir.VectorType(ir.IntType(1), LANES)
@@ -34,20 +33,24 @@ WHOLE = ir.VectorType(ir.IntType(64), LANES)
 class LanesType(types.Type):
     """Type of a number for each episode."""
 
+    vector = NUMBERS
+
     def __init__(self) -> None:
         super().__init__(name=f"lanes{LANES}")
 
     def can_convert_from(self, _: Any, other: types.Type) -> Conversion | None:
-        """Numbers become the same number for each episode."""
+        """Numbers convert to one number for all episodes."""
         return Conversion.safe if isinstance(other, types.Float | types.Integer) else None
 
     def unify(self, _: Any, other: types.Type) -> types.Type | None:
-        """Lanes are the type of a value that is a number on one path and lanes on another."""
+        """Numbers on one path and lanes on another are lanes."""
         return self if isinstance(other, types.Float | types.Integer) else None
 
 
 class MaskType(types.Type):
     """Type of a truth value for each episode."""
+
+    vector = BITS
 
     def __init__(self) -> None:
         super().__init__(name=f"mask{LANES}")
@@ -57,21 +60,16 @@ lanes, mask = LanesType(), MaskType()
 
 
 @register_model(LanesType)
-class _LanesModel(models.PrimitiveModel):
-    def __init__(self, manager: Any, kind: types.Type) -> None:
-        super().__init__(manager, kind, NUMBERS)
-
-
 @register_model(MaskType)
-class _MaskModel(models.PrimitiveModel):
-    def __init__(self, manager: Any, kind: types.Type) -> None:
-        super().__init__(manager, kind, BITS)
+class _VectorModel(models.PrimitiveModel):
+    def __init__(self, manager: Any, kind: Any) -> None:
+        super().__init__(manager, kind, kind.vector)
 
 
 @lower_cast(types.Float, lanes)
 @lower_cast(types.Integer, lanes)
 def _broadcast(_: Any, builder: Any, given: types.Type, __: types.Type, value: Any) -> Any:
-    """Repeat a number for each episode."""
+    """Repeat a number for all episodes."""
     if isinstance(given, types.Integer):
         value = builder.sitofp(value, ir.DoubleType())
     elif given == types.float32:
@@ -98,7 +96,7 @@ def _teach(
     arity: int,
     instruction: Callable[..., Any],
 ) -> None:
-    """Let a Python function or operator act on lanes, or on masks, by an instruction."""
+    """Let a Python function or operator act on lanes or masks."""
 
     class Template(AbstractTemplate):
         metadata = FIRST
@@ -116,19 +114,19 @@ def _teach(
 
 
 def _compare(symbol: str) -> Callable[..., Any]:
-    """Comparison that is false if either number is NaN, but for ``!=``."""
+    """Comparison that NaN makes false, except for ``!=``."""
     if symbol == "!=":
         return lambda builder, x, y: builder.fcmp_unordered(symbol, x, y)
     return lambda builder, x, y: builder.fcmp_ordered(symbol, x, y)
 
 
 def _choose(symbol: str) -> Callable[..., Any]:
-    """The first argument where the comparison holds, else the second."""
+    """The first argument where a comparison holds, else the second."""
     return lambda builder, x, y: builder.select(builder.fcmp_ordered(symbol, x, y), x, y)
 
 
 def _call(name: str) -> Callable[..., Any]:
-    """One of LLVM's functions of a number, for each episode."""
+    """LLVM's function of a number, for each episode."""
     form = ir.FunctionType(NUMBERS, [NUMBERS])
 
     def instruction(builder: Any, value: Any) -> Any:
@@ -161,12 +159,12 @@ _teach(math.sqrt, lanes, lanes, 1, _call("sqrt"))
 
 
 instruction: Any = intrinsic
-"""Kernels call what is written for the types of their arguments."""
+"""Kernels call what it writes for the types of their arguments."""
 
 
 @instruction
 def power_of_two(_: Any, exponent: types.Type) -> Any:
-    """2 to the power of a whole number between -1022 and 1023, for a number or lanes."""
+    """2 to the power of a whole number between -1022 and 1023, or of lanes."""
 
     def code(_context: Any, builder: Any, _signature: Any, arguments: Any) -> Any:
         (value,) = arguments
@@ -184,7 +182,7 @@ def power_of_two(_: Any, exponent: types.Type) -> Any:
 
 @instruction
 def select(_: Any, condition: types.Type, first: types.Type, second: types.Type) -> Any:
-    """``first`` where a condition holds, else ``second``: without a branch, for each episode."""
+    """``first`` where a condition holds, else ``second``, without a branch."""
     many = condition == mask
     if not many and condition != types.boolean:
         return None
@@ -214,7 +212,7 @@ def any_lane(_: Any, condition: types.Type) -> Any:
 
 @instruction
 def lane_bits(_: Any, condition: types.Type) -> Any:
-    """The truth values of a mask as the bits of a whole number."""
+    """Truth values of a mask as bits of a whole number."""
 
     def code(_context: Any, builder: Any, _signature: Any, arguments: Any) -> Any:
         bits = builder.bitcast(arguments[0], ir.IntType(LANES))
@@ -225,18 +223,18 @@ def lane_bits(_: Any, condition: types.Type) -> Any:
 
 @instruction
 def as_lanes(_: Any, array: types.Array) -> Any:
-    """View a C-contiguous array of float64 whose last axis has `LANES` entries as one of lanes."""
+    """View a contiguous array of float64, with `LANES` in its last axis, as lanes."""
     return _viewed(array, types.Array(lanes, array.ndim - 1, "C", aligned=False))
 
 
 @instruction
 def as_numbers(_: Any, array: types.Array) -> Any:
-    """View a C-contiguous array of lanes as one of float64, which has one axis more."""
+    """View a contiguous array of lanes as one of float64, with one axis more."""
     return _viewed(array, types.Array(types.float64, array.ndim + 1, "C"))
 
 
 def _viewed(array: types.Array, view: types.Array) -> Any:
-    """Signature and code of a view that has the last axis, that of the episodes, more or less."""
+    """Signature and code of a view that adds or drops the last axis."""
 
     def code(context: Any, builder: Any, _signature: Any, arguments: Any) -> Any:
         from numba.core import cgutils
@@ -255,7 +253,7 @@ def _viewed(array: types.Array, view: types.Array) -> Any:
 def array_at(
     context: Any, builder: Any, kind: types.Array, data: Any, shape: list[Any], **owner: Any
 ) -> Any:
-    """Make an array of a type and shape, in C order, of what begins at an address."""
+    """Make an array of a type and shape, in C order, at an address."""
     from numba.np.arrayobj import make_array, populate_array
 
     made, entry = make_array(kind)(context, builder), context.get_data_type(kind.dtype)

@@ -1,4 +1,4 @@
-"""Actions of an episode or a block of them: by dense networks, or from a table."""
+"""Actions of a block of episodes, by dense networks or from a table."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,7 +24,7 @@ def affine_layer(
     outputs: Array,
     sink: int,
 ) -> None:
-    """Apply an affine layer: sums stay in registers, five at a time."""
+    """Apply an affine layer, with five sums at a time in registers."""
     bias = offset + n_in * n_out
     blocked = n_out - n_out % 5
     for j in range(0, blocked, 5):
@@ -80,10 +80,10 @@ def act(
     hidden: Array,
     action: Array,
 ) -> None:
-    """Let a network choose an action, shape (1, n_actions), for its inputs, shape (1, n_inputs).
+    """Let a network choose an action, shape (1, n_actions), for inputs, shape (1, n_inputs).
 
-    Layers, activations and weights are those of `kinarm.episodes.Control`; the latter are numbers,
-    or lanes if each episode has its own. ``hidden`` holds two layers by turns.
+    Layers, activations and weights, numbers or lanes of own ones, are those of
+    `kinarm.episodes.Control`. ``hidden`` holds two layers by turns.
     """
     n_layers, offset = layers.shape[0] - 1, 0
     for layer in range(n_layers):
@@ -100,7 +100,7 @@ def act(
 
 @inlined
 def shared_policy(n_episodes: int, control: Control) -> int:
-    """The policy of all episodes; -1 if they have several, 0 if they have a table."""
+    """Policy of all episodes; -1 if there are several, 0 with a table."""
     if control.layers.shape[0] == 0 or n_episodes == 0:
         return 0
     for e in range(1, n_episodes):
@@ -113,8 +113,7 @@ def shared_policy(n_episodes: int, control: Control) -> int:
 def choose_actions(control: Control, shared: int, row: NDArray[np.int64], block: Block) -> None:
     """Fill in the actions of a block.
 
-    ``shared`` is what `shared_policy` returned, and ``row`` tells which episodes are in the block,
-    -1 where there is none.
+    ``shared`` is that of `shared_policy`, and ``row`` has the block's episodes, -1 for none.
     """
     layers, activations, signs = control.layers, control.activations, control.observation_signs
     reflected = block.observation[0, control.side] > 0.0
@@ -126,13 +125,12 @@ def choose_actions(control: Control, shared: int, row: NDArray[np.int64], block:
                 for axis in range(held.shape[1]):
                     held[0, axis, lane] = control.actions[row[lane], column, axis]
     else:
-        mirrored = signs.shape[0] > 0
-        # Networks with a mirror have learnt goals on the right alone: goals on the left they are
-        # given reflected, and their actions are reflected in turn.
+        # Networks with a mirror know goals on the right alone: observations of goals on the left
+        # are reflected, and so are the actions.
         for i in range(signs.shape[0]):
             given = block.observation[0, i]
             block.seen[0, i] = select(reflected, signs[i] * given, given)
-        seen = block.seen if mirrored else block.observation
+        seen = block.seen if signs.shape[0] > 0 else block.observation
         if shared >= 0:
             weights = control.weights[shared]
             act(layers, activations, weights, seen, block.hidden, block.action)

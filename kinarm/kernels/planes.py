@@ -1,17 +1,15 @@
 """Separating planes between two bodies, for a number or lanes.
 
-A body is enclosed by a rounded polytope: the hull of a few corners, widened by a radius. A pair of
-bodies keeps a plane that moves with the first of them, the carrier, which lies below it; the least
-height of the second, the mover, above the plane is a lower bound of their distance. Of the ground,
-the plane is its surface.
+A rounded polytope, the hull of a few corners widened by a radius, encloses each body. A pair's
+plane lies above its first body, the carrier, and moves with it; the least height of the second, the
+mover, above it bounds their distance from below. The ground's plane is its surface.
 
 A plane has five entries: unit normal x, y, z in the joint frame that carries it, offset along
-the normal, and the least height of the mover above it, when that was last asked for [m].
+the normal, and the mover's least height when last asked for [m].
 
-The best plane follows from the distance algorithm of Gilbert, Johnson and Keerthi. It looks for the
-point closest to the origin of all differences of a point of the mover and one of the carrier, in
-the frame that carries the latter: in a simplex of at most four of their corners' differences, which
-is renewed by the corners that lie lowest along the way found so far.
+The best plane follows from the distance algorithm of Gilbert, Johnson and Keerthi. In the carrier's
+frame it looks for the point closest to the origin of all differences of points of mover and
+carrier, in a simplex of at most four differences of corners, renewed by the lowest ones.
 """
 
 import math
@@ -32,16 +30,16 @@ OFFSET, GAP = 3, 4
 """Entries of a plane after its normal."""
 
 ALTERNATIONS = 3
-"""Projections between box and segment by which a first plane is proposed."""
+"""Projections between box and segment for a first plane."""
 
 CORNERS_TRIED = 24
-"""Corners after which the search ends."""
+"""Corners at which the search ends."""
 
 CLOSE = 1e-7
 """Precision of the distance [m]."""
 
 COARSE = 0.02
-"""Precision of the distance, where bodies are far apart, as a share of it."""
+"""Precision of the distance of far bodies, as a share of it."""
 
 
 @inlined
@@ -54,7 +52,7 @@ def axis_in_world(shapes: ContactShapes, body: int, poses: Array) -> tuple[Vecto
 
 @inlined
 def lowest(shapes: ContactShapes, body: int, x: float, y: float, z: float) -> float:
-    """Smallest coordinate of a body along a vector of its joint frame, its radius apart."""
+    """Least coordinate of a body's corners along a vector of its joint frame."""
     corners, first, last = shapes.corners, shapes.bodies[body, 0], shapes.bodies[body, 1]
     least = x * corners[first, 0] + y * corners[first, 1] + z * corners[first, 2]
     for i in range(first + 1, last):
@@ -68,7 +66,7 @@ def height_above(
 ) -> float:
     """Least height of a pair's mover above a row of the planes [m].
 
-    The level is `EVERYDAY` or `FINE`: which polytope stands for the mover.
+    The level, `EVERYDAY` or `FINE`, is that of the mover's polytope.
     """
     carrier, mover = shapes.planes[pair, 0], shapes.proxies[pair, level, 1]
     base = 0 if carrier == GROUND else shapes.bodies[carrier, 2]
@@ -85,10 +83,9 @@ def height_above(
 
 @helper
 def propose(shapes: ContactShapes, pair: int, poses: Array, plane: Array, row: int) -> None:
-    """Fill in a row of the planes with a likely plane for a pair; its height is left as it is.
+    """Fill in a row of the planes with a likely plane for a pair, without its height.
 
     Its normal leads from the carrier's axis, or the box about an obstacle, to the mover's axis.
-    Whether such a plane separates the two is for its height to tell.
     """
     carrier, mover = shapes.planes[pair, 0], shapes.planes[pair, 1]
     if carrier == GROUND:
@@ -113,7 +110,7 @@ def propose(shapes: ContactShapes, pair: int, poses: Array, plane: Array, row: i
 
 @inlined
 def from_box(a: Vector, b: Vector, lower: Vector, upper: Vector) -> Vector:
-    """Vector from a point of a box to one of the segment ab, close to the shortest one."""
+    """Vector from a box to the segment ab, close to the shortest one."""
     ux, uy, uz = b[0] - a[0], b[1] - a[1], b[2] - a[2]
     length = ux * ux + uy * uy + uz * uz + 1e-12
     x, y, z = a[0] + 0.5 * ux, a[1] + 0.5 * uy, a[2] + 0.5 * uz
@@ -131,9 +128,9 @@ def from_box(a: Vector, b: Vector, lower: Vector, upper: Vector) -> Vector:
 def lowest_corner(
     corners: Array, spans: NDArray[np.int64], body: int, x: float, y: float, z: float
 ) -> int:
-    """Row of the corner of a body that lies lowest along a vector of its joint frame.
+    """Row of a body's corner that is lowest along a vector of its joint frame.
 
-    The first two columns of ``spans`` are each body's first row and the one after its last.
+    ``spans`` begins with each body's first row and the one after its last.
     """
     found, least = spans[body, 0], math.inf
     for i in range(spans[body, 0], spans[body, 1]):
@@ -152,15 +149,14 @@ def separate(
     simplex: Array,
     plane: Array,
 ) -> float:
-    """Find a plane that separates a pair well, and return the height of its mover above it [m].
+    """Find a plane that separates a pair well; return the mover's height above it [m].
 
-    Takes poses of numbers. The plane, shape (1, PLANE), is where the search begins, and is
-    replaced by a better one. ``relative``, shape (1, POSE), and ``simplex``, shape (4, 3), are work
-    space.
+    Takes poses of numbers. The plane, shape (1, PLANE), is replaced by a better one.
+    ``relative``, shape (1, POSE), and ``simplex``, shape (4, 3), are work space.
     """
     carrier, mover = shapes.proxies[pair, FINE, 0], shapes.proxies[pair, FINE, 1]
     base, link = shapes.bodies[carrier, 2], shapes.bodies[mover, 2]
-    # The pose of the mover's frame in the carrier's.
+    # The mover's pose in the carrier's frame.
     for k in range(3):
         relative[0, 4 + k], relative[0, 7 + k], relative[0, 10 + k] = rotated_back(
             poses, base, poses[link, 4 + k], poses[link, 7 + k], poses[link, 10 + k]
@@ -176,7 +172,7 @@ def separate(
     nx, ny, nz = plane[0, 0], plane[0, 1], plane[0, 2]
     best, size, norm = -math.inf, 0, math.inf
     for _ in range(CORNERS_TRIED):
-        # The mover's corner that lies lowest, and the carrier's that lies highest.
+        # The mover's lowest corner, and the carrier's highest.
         x, y, z = rotated_back(relative, 0, nx, ny, nz)
         low = lowest_corner(shapes.corners, shapes.bodies, mover, x, y, z)
         high = lowest_corner(shapes.corners, shapes.bodies, carrier, -nx, -ny, -nz)

@@ -1,15 +1,13 @@
 """Proof that steps are free of contact, or that bodies touch, for a block of episodes.
 
-A step moves the arm from q to q' and is tested at n configurations q + k/n (q' - q). Of every pair
-of bodies, the height of the second above the plane of the first (`kinarm.kernels.planes`) is known
-at q. Along the step it is the least of the heights of some corners, whose second derivative is
-bounded by a *bend* c: at the share s of the step it is at least (1 - s) h + s h' - s (1 - s) c / 2.
-Where that does not prove the step, the plane is replaced by a better one, and only if that is not
-enough, the configurations between are looked at one by one.
+A step moves the arm from q to q' and is tested at n configurations q + k/n (q' - q). The height h
+of the second body of a pair above the plane of the first (`kinarm.kernels.planes`) is known at q.
+Along the step it is the least height of some corners, whose second derivative is bounded by a
+*bend* c: at the share s it is at least (1 - s) h + s h' - s (1 - s) c / 2. Where that proves
+nothing, a better plane is taken, and then each configuration between.
 
-Contact is proven between bodies whose shapes are known exactly: capsules, obstacles and the ground.
-Two points of them that are closer to each other than the radii about them prove that they overlap,
-wherever these points come from. Of arms with other shapes nothing is claimed.
+Contact is proven between capsules, obstacles and the ground, whose shapes are exact: two of their
+points that are closer than the radii about them prove an overlap.
 """
 
 import math
@@ -32,12 +30,12 @@ from kinarm.kernels.planes import (
 from kinarm.kernels.session import Alone, Block, put, take, take_rows
 
 MARGIN = 1e-6
-"""Distance below which freedom is not claimed [m]: the tolerance of Coal's iterations."""
+"""Distance below which freedom is not claimed [m]: Coal's tolerance."""
 
 
 @inlined
 def is_apart(bound: float) -> bool:
-    """Whether a lower bound of a distance proves freedom from contact; NaN proves nothing."""
+    """Whether a lower bound of a distance proves freedom; NaN proves nothing."""
     return bound > MARGIN
 
 
@@ -45,8 +43,8 @@ def is_apart(bound: float) -> bool:
 def twist_step(block: Block) -> None:
     """Fill in how the axes of a block move together in a step.
 
-    The second derivative of a point by two axes is no larger than how fast the later one moves
-    it, since the earlier one only turns that motion.
+    The second derivative of a point by two axes is at most its speed by the later one, which the
+    earlier one only turns.
     """
     n_axes = block.twist.shape[0]
     for first in range(n_axes):
@@ -59,9 +57,9 @@ def twist_step(block: Block) -> None:
 
 @inlined
 def prove_step(shapes: ContactShapes, tested: int, poses: Array, block: Block) -> float:
-    """Renew the heights of all pairs, and return a bound that shows which steps are free.
+    """Renew the heights of all pairs; return a bound that shows which steps are free.
 
-    Takes the poses at the target. One bend, larger than that of any pair, serves for all.
+    Takes the poses at the target. One bend, larger than any pair's, serves for all.
     """
     twist_step(block)
     bend = 0.0 * block.q[0, 0]
@@ -81,10 +79,9 @@ def prove_step(shapes: ContactShapes, tested: int, poses: Array, block: Block) -
 def renew_planes(
     shapes: ContactShapes, tested: int, stale: bool, before: Array, poses: Array, block: Block
 ) -> float:
-    """Prove steps by the pairs' own bends, or give these new planes; return the bound.
+    """Prove steps by the pairs' own bends, or by new planes; return the bound.
 
-    ``stale`` says of which episodes the step is to be proven. Takes the poses ``before`` the step
-    and at the target.
+    ``stale`` says whose steps are to be proven. Poses are ``before`` the step and at the target.
     """
     least = 0.0 * block.q[0, 0] + 1.0
     n_pairs, share = shapes.planes.shape[0], 1.0 / tested
@@ -118,7 +115,7 @@ def renew_planes(
 
 @inlined
 def open_configurations(before: float, after: float, bend: float, tested: int) -> int:
-    """Bit k - 1 is set if configuration k is not proven free by heights before and after."""
+    """Bit k - 1 is set if the heights do not prove configuration k free."""
     unproven = 0
     for k in range(1, tested + 1):
         share = k / tested
@@ -137,13 +134,13 @@ def prove_alone(
     block: Block,
     alone: Alone,
 ) -> int:
-    """Prove the step of a single episode as far as `prove_step` has not, and better its planes.
+    """Prove what `prove_step` has not of an episode's step, and better its planes.
 
-    Returns a number whose bit k - 1 is set if configuration k could not be proven free.
+    Returns a number whose bit k - 1 is set if configuration k is not proven free.
     """
     plane, planes = alone.plane, as_numbers(block.planes)
     heights, bends = as_numbers(block.height), as_numbers(block.bend)
-    # Give each pair that is not proven a better plane, and list those that remain.
+    # Better the planes of pairs that are not proven, and list those that remain.
     take_rows(poses, lane, alone.after)
     at_start, n_open, all_open, target_bit = False, 0, 0, 1 << (tested - 1)
     for pair in range(shapes.planes.shape[0]):
@@ -166,7 +163,7 @@ def prove_alone(
         alone.listed[n_open, 0], alone.listed[n_open, 1] = pair, unproven
         n_open += 0 if unproven == 0 else 1
         all_open |= unproven
-    # Look at the configurations between, pair by pair, up to the first that stays in doubt.
+    # Look at configurations between up to the first pair that stays in doubt.
     doubt = all_open & target_bit
     for k in range(1, tested):
         bit = 1 << (k - 1)
@@ -187,7 +184,7 @@ def prove_alone(
 def is_proven_apart(
     pair: int, lane: int, shapes: ContactShapes, block: Block, alone: Alone
 ) -> bool:
-    """Whether a pair is proven apart at ``alone.before``, by its plane or by a better one."""
+    """Whether its or a better plane proves a pair apart at ``alone.before``."""
     take(block.planes, pair, lane, alone.plane, 0)
     height = height_above(shapes, pair, FINE, alone.before, alone.plane, 0)
     if not is_apart(height) and shapes.planes[pair, 0] != GROUND:
@@ -197,7 +194,7 @@ def is_proven_apart(
 
 @inlined
 def place_between(k: int, tested: int, lane: int, chain: Chain, block: Block, alone: Alone) -> None:
-    """Fill in the poses of a single episode at configuration k of its step, below ``tested``."""
+    """Fill in an episode's poses at configuration k < ``tested`` of its step."""
     q, target = as_numbers(block.q), as_numbers(block.target)
     for joint in range(block.q.shape[1]):
         start, end = q[0, joint, lane], target[0, joint, lane]
@@ -209,7 +206,7 @@ def place_between(k: int, tested: int, lane: int, chain: Chain, block: Block, al
 def prove_configuration(
     lane: int, shapes: ContactShapes, poses: Array, block: Block, alone: Alone
 ) -> bool:
-    """Prove the configuration of a single episode free as far as first planes have not."""
+    """Prove an episode's configuration free as far as first planes have not."""
     plane, planes, free = alone.plane, as_numbers(block.planes), True
     take_rows(poses, lane, alone.after)
     for pair in range(shapes.planes.shape[0]):
@@ -229,7 +226,7 @@ def prove_configuration(
 def prove_configurations(
     shapes: ContactShapes, touched: int, filled: int, block: Block, alone: Alone
 ) -> int:
-    """Bits of the arms that are proven free of contact; ``touched`` are those that are not.
+    """Bits of the arms that are proven free; ``touched`` are those that are not.
 
     Takes the poses ``after``, and gives all pairs a first plane.
     """
@@ -256,7 +253,7 @@ def is_exact(shapes: ContactShapes, pair: int) -> bool:
 
 @helper
 def overlap(shapes: ContactShapes, pair: int, poses: Array) -> float:
-    """Lower bound of how deep an exact pair overlaps [m]; negative if it may be apart."""
+    """Lower bound of an exact pair's overlap [m]; negative if apart."""
     kind, first, second = shapes.pairs[pair, 0], shapes.pairs[pair, 1], shapes.pairs[pair, 2]
     a, b = axis_in_world(shapes, first, poses)
     radius = shapes.capsules[first, 6]
@@ -281,7 +278,7 @@ def overlap(shapes: ContactShapes, pair: int, poses: Array) -> float:
 
 @inlined
 def deepest_overlap(shapes: ContactShapes, poses: Array) -> float:
-    """Lower bound of how deep the deepest of all exact pairs overlaps [m]."""
+    """Lower bound of the deepest overlap of all exact pairs [m]."""
     depth = 0.0 * poses[0, 13] - 1.0
     for pair in range(shapes.pairs.shape[0]):
         if is_exact(shapes, pair):
@@ -299,9 +296,9 @@ def first_contact(
     block: Block,
     alone: Alone,
 ) -> int:
-    """Number, from 1, of the pair that surely is the first to touch in a step; 0 if none is.
+    """Number, from 1, of the pair that surely touches first in a step; 0 if none is.
 
-    Looks at the first configuration of which the bits of ``doubt`` say that it is not proven free.
+    Looks at the first configuration that ``doubt`` does not show as free.
     """
     k = 1
     while doubt >> (k - 1) & 1 == 0:

@@ -1,8 +1,8 @@
-"""Arrays and numbers by one address: what a kernel would otherwise take apart, array by array.
+"""Arrays and numbers by one address, instead of array by array.
 
-Numba hands a named tuple over as everything that is in it, from Python to a kernel, and from a
-kernel to each helper. A `Record` is a table of addresses, shapes and numbers, made once. Kernels
-take its own address, and see what is in it as attributes, like those of the named tuple.
+Numba hands over all that is in a named tuple, to kernels and to each helper. A `Record` is a table
+of addresses, shapes and numbers, made once. Kernels take its address, and read its attributes as of
+a named tuple.
 """
 
 import hashlib
@@ -31,10 +31,10 @@ from numpy.typing import NDArray
 from kinarm.kernels.lanes import LANES, array_at, lanes
 
 WORD = ir.IntType(64)
-"""An entry of a table: address, length, whole number, or the bits of another number."""
+"""Entry of a table: address, length, or the bits of a number."""
 
 CACHE_LINE = 8 * LANES
-"""Bytes of a line of the cache, and of a number in lanes."""
+"""Bytes of a line of the cache, and of lanes."""
 
 from_buffer: Any = (c_char * 0).from_buffer
 
@@ -42,11 +42,11 @@ Shapes: TypeAlias = dict[str, tuple[types.Type, tuple[int, ...]]]
 
 
 class Fixed(int):
-    """A length that belongs to the type of an array, so that kernels are compiled for it."""
+    """A length in an array's type, for which kernels are compiled."""
 
 
 class RecordType(types.Type):
-    """Numba's type of a record: names and types of what is in it, and lengths that are fixed."""
+    """Numba's type of a record: names, types and fixed lengths."""
 
     def __init__(
         self,
@@ -60,22 +60,22 @@ class RecordType(types.Type):
             self.places[field] = end
             end += 1 + (kind.ndim if isinstance(kind, types.Array) else 0)
         self.length = end
-        # The name becomes part of the names of all functions that take such a record.
+        # The name is part of the names of functions that take such a record.
         digest = hashlib.sha256(repr((fields, self.fixed)).encode()).hexdigest()
         super().__init__(f"{name}-{digest[:12]}")
 
 
 class Record:
-    """Named arrays, numbers and records, for kernels; `recorded` and `Layout` make them.
+    """Named arrays, numbers and records for kernels, by `recorded` or `Layout`.
 
     What is in an array may change, but not which array it is.
 
     Attributes
     ----------
     address : int
-        Where the table is.
+        Of the table.
     values : named tuple or ndarray
-        What it is a record of, or the buffer in which its arrays lie.
+        What is recorded, or the buffer of its arrays.
     """
 
     def __init__(self, kind: RecordType, words: NDArray[np.int64], values: Any) -> None:
@@ -94,14 +94,14 @@ class Record:
 def recorded(values: Any) -> Any:
     """Record of a named tuple of arrays, records and numbers, which it keeps alive.
 
-    Kernels and helpers take it in the tuple's stead. All entries of an array have to lie side by
-    side, in C order. What is a record already stays one.
+    Kernels take it instead of the tuple. Arrays must be contiguous, in C order. Records are
+    returned themselves.
     """
     return values if isinstance(values, Record) else Record(*table(values), values)
 
 
 def table(values: Any) -> tuple[RecordType, NDArray[np.int64]]:
-    """Type and table of the record of a named tuple."""
+    """Type and table of a named tuple's record."""
     named: Any = type(values)
     words: list[int] = []
     kinds: list[Any] = []
@@ -123,15 +123,14 @@ def table(values: Any) -> tuple[RecordType, NDArray[np.int64]]:
 
 
 class Layout:
-    """How arrays lie side by side in one buffer.
+    """Arrays side by side in one buffer.
 
     Parameters
     ----------
     name : str
         Name of the type.
     shapes : mapping
-        Per array the type of its entries, `lanes`, float64 or int64, and its shape, of which some
-        lengths may be `Fixed`.
+        Type of entries, `lanes`, float64 or int64, and shape of each array; lengths may be `Fixed`.
     """
 
     def __init__(self, name: str, shapes: Shapes) -> None:
@@ -154,15 +153,15 @@ class Layout:
         self._kind = RecordType(name, tuple(kinds), fixed)
 
     def record(self) -> Any:
-        """Record of new arrays, which are zero, with their buffer as its values."""
+        """Record of new arrays of zeros, whose values are their buffer."""
         buffer = np.zeros(self._size + LANES)
-        # Lanes that begin where a line of the cache does lie in one line.
+        # Aligned lanes lie in one line of the cache.
         start = _address(buffer) + -_address(buffer) % CACHE_LINE
         return Record(self._kind, self._words + start * self._moved, buffer)
 
 
 def _address(array: NDArray[Any]) -> int:
-    """Where an array begins; its entries have to lie side by side."""
+    """Address of an array, which must be contiguous."""
     try:
         return addressof(from_buffer(array))  # three times as fast as other ways
     except TypeError:  # It is read-only, or has gaps.
@@ -173,21 +172,20 @@ def _address(array: NDArray[Any]) -> int:
 
 @cache
 def _array_type(entry: types.Type, ndim: int) -> types.Array:
-    # Lanes need not lie where their size would have it.
+    # Lanes need not be aligned to their size.
     return types.Array(entry, ndim, "C", aligned=entry != lanes)
 
 
 @cache
 def _record_type(named: Any, *kinds: Any) -> RecordType:
-    """Type of the record of a named tuple, whose arrays are given by their types and axes."""
-    fields = zip(named._fields, kinds, strict=True)
+    """Type of a named tuple's record, with arrays given by types and axes."""
     return RecordType(
         named.__name__,
         tuple(
             (name, _array_type(from_dtype(np.dtype(kind[0])), kind[1]))
             if isinstance(kind, tuple)
             else (name, kind)
-            for name, kind in fields
+            for name, kind in zip(named._fields, kinds, strict=True)
         ),
     )
 
@@ -208,7 +206,7 @@ def _unboxed(_: RecordType, value: Any, c: Any) -> NativeValue:
 
 
 def _field_type(_: Any, record: RecordType, name: str) -> types.Type | None:
-    """Type of what a record holds by a name."""
+    """Type of a record's field."""
     return record.fields.get(name)
 
 
@@ -218,18 +216,18 @@ infer_getattr(type("RecordAttribute", (AttributeTemplate,), _resolved))
 
 @lower_getattr_generic(RecordType)
 def _read_field(context: Any, builder: Any, record: RecordType, table: Any, name: str) -> Any:
-    """Read from the table. Nothing counts references: the record keeps alive what is in it."""
+    """Read from the table, uncounted: the record keeps its fields alive."""
     kind, place = record.fields[name], record.places[name]
 
     def word(offset: int, form: Any) -> Any:
         where = builder.gep(table, [WORD(place + offset)])
         value = builder.load(builder.bitcast(where, form.as_pointer()))
-        # Tables never change, whatever else is written.
+        # Tables never change.
         value.set_metadata("invariant.load", builder.module.add_metadata([]))
         return value
 
     if isinstance(kind, RecordType):
-        # What lies in a table may be read ahead of loops, whether they read it or not.
+        # Tables may be read ahead of loops.
         inner, whole = word(0, WORD.as_pointer()), builder.module.add_metadata
         inner.set_metadata("dereferenceable", whole([WORD(8 * kind.length)]))
         inner.set_metadata("align", whole([WORD(8)]))

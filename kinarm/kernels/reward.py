@@ -1,7 +1,7 @@
 """Observation, distance and reward of a step.
 
 The reward is a sum of terms (paper, section 3.3: closer is positive, farther negative). A new
-term is a field of `kinarm.task.RewardWeights` and its formula here, in the same order.
+term is a field of `kinarm.task.RewardWeights` and a formula here, in the same order.
 """
 
 import math
@@ -12,7 +12,7 @@ from kinarm.kernels.lanes import select
 from kinarm.observation import write_observation
 
 PROGRESS, CLOSER, STEP, COLLISION, SUCCESS = range(5)
-"""Columns of the terms; from `COLLISION` on, they are paid when an episode ends."""
+"""Columns of the terms; `COLLISION` and later ones are paid at the end."""
 
 
 @inlined
@@ -28,7 +28,7 @@ def add_reward(
 ) -> None:
     """Fill in the weighted terms of an episode's step, and add them to its return.
 
-    ``before`` and ``after`` are the distances from the tool to the goal about the step [m].
+    Takes the tool's distances from the goal before and after the step [m].
     """
     sign = select(after < before, 1.0, select(after > before, -1.0, 0.0))
     terms[e, PROGRESS] = weights[PROGRESS] * (before - after)
@@ -46,7 +46,7 @@ def add_reward(
 
 @inlined
 def observe(tool: Array, poses: Array, goals: Array, row: int, observations: Array) -> float:
-    """Fill in a row of the observations and return the distance from the tool to the goal [m]."""
+    """Write a row of observations; return the distance to the goal [m]."""
     point = to_world(poses, poses.shape[0] - 1, tool[0], tool[1], tool[2])
     write_observation(poses, point, goals, row, observations, 0)
     dx, dy, dz = goals[row, 0] - point[0], goals[row, 1] - point[1], goals[row, 2] - point[2]

@@ -1,7 +1,7 @@
-"""Kernels of rollouts: the beginning of episodes, whole episodes, and their results.
+"""Kernels of rollouts: the beginning of episodes, whole episodes, and results.
 
-An episode's numbers depend on nothing but its inputs. A step that is not proven free of contact
-pauses the episode until Coal has decided about it.
+Numbers of an episode depend on its inputs alone. A step that is not proven free pauses the episode
+until Coal has decided.
 """
 
 import numpy as np
@@ -37,8 +37,7 @@ from kinarm.kernels.session import (
 def begin(counters: NDArray[np.int64], session: Session, rows: NDArray[np.int64]) -> int:
     """Start episodes at their ``q`` and ``goal``; ``rows``, shape (n,), tells which.
 
-    Returns how many are left paused, since their starts are not proven free of contact. Several
-    threads may share them as in `advance`.
+    Returns how many pause, as not proven free. Threads may share them as in `advance`.
     """
     block, alone = session.block, session.alone
     chain, shapes, episodes = session.chain, session.shapes, session.episodes
@@ -49,7 +48,7 @@ def begin(counters: NDArray[np.int64], session: Session, rows: NDArray[np.int64]
         if start >= rows.shape[0]:
             return n_paused
         filled = min(rows.shape[0] - start, LANES)
-        # Load starts and goals; the last one repeats where there are no more.
+        # Load starts and goals; the last one repeats.
         for lane in range(LANES):
             e = rows[start + min(lane, filled - 1)]
             put(q, e, block.q, 0, lane)
@@ -76,14 +75,11 @@ def begin(counters: NDArray[np.int64], session: Session, rows: NDArray[np.int64]
 
 @lean_kernel
 def advance(counters: NDArray[np.int64], session: Session) -> int:
-    """Advance the running episodes, a block at a time.
+    """Advance the running episodes, a block at a time; return how many paused.
 
-    Each goes on until it ends, reaches its ``stop`` or pauses before a step that is neither proven
-    free of contact nor proven to touch; then the next one takes its place in the block. Returns
-    how many paused.
-
-    Several threads may do so together, each with a session of its own: the first of the counters,
-    zero at first, tells which episode is the next one.
+    Each goes on until it ends, reaches its ``stop`` or pauses before a step that is proven neither
+    free nor to touch; then the next one takes its lane. Threads with own sessions may share them:
+    the first counter, zero at first, numbers the next episode.
     """
     chain, shapes, rules = session.chain, session.shapes, session.rules
     control, episodes = session.control, session.episodes
@@ -108,7 +104,7 @@ def advance(counters: NDArray[np.int64], session: Session) -> int:
                     changed = True
         if n_alive == 0:
             return n_paused
-        # Act, but where the step under way is one that Coal has found free.
+        # Act, unless Coal has found the step under way free.
         choose_actions(control, shared, row, block)
         fresh = (block.alive[0] > 0.0) & ~(block.cleared[0] > 0.0)
         for i in range(summed):
@@ -119,7 +115,7 @@ def advance(counters: NDArray[np.int64], session: Session) -> int:
             moved = block.q[0, axis] + block.action[0, axis] * rules.step_limit[axis]
             moved = min(max(moved, lower[axis]), upper[axis])
             block.target[0, axis] = select(fresh, moved, block.target[0, axis])
-        # Prove the steps free of contact: all together, then by new planes, then one by one.
+        # Prove the steps free: together, then by new planes, then one by one.
         before, poses = poses, before
         forward_kinematics(chain, block.target, 0, poses)
         unproven = ~is_apart(prove_step(shapes, rules.tested, poses, block)) & fresh
@@ -135,7 +131,7 @@ def advance(counters: NDArray[np.int64], session: Session) -> int:
                     continue
                 doubt = prove_alone(lane, chain, shapes, rules.tested, poses, block, alone)
                 if doubt != 0:
-                    # The episode leaves the block: it ends here, or waits for Coal.
+                    # The episode leaves the block, at its end or to wait for Coal.
                     e, row[lane] = row[lane], -1
                     store_episode(lane, e, episodes, block)
                     for pair in range(n_pairs):
@@ -186,7 +182,7 @@ def advance(counters: NDArray[np.int64], session: Session) -> int:
 
 @inlined
 def next_waiting(counters: NDArray[np.int64], episodes: Episodes) -> int:
-    """Take the next episode that is to be advanced; past the last one if there is none."""
+    """Next episode to be advanced; past the last one if there is none."""
     while True:
         e = take_number(counters, 0)
         if e >= episodes.status.shape[0]:
@@ -197,7 +193,7 @@ def next_waiting(counters: NDArray[np.int64], episodes: Episodes) -> int:
 
 @lean_kernel
 def allow_one_step(session: Session) -> bool:
-    """Let every episode go on by one step; returns whether all its actions are finite."""
+    """Let episodes go on by one step; return whether all actions are finite."""
     steps, stop, actions = session.episodes.steps, session.episodes.stop, session.control.actions
     nothing = 0.0
     for e in range(steps.shape[0]):
@@ -211,7 +207,7 @@ def allow_one_step(session: Session) -> bool:
 def results_of_step(
     session: Session, numbers: Array, flags: NDArray[np.bool_], contact: NDArray[np.int64]
 ) -> None:
-    """Read off the one step that was allowed, into the tables of `kinarm.episodes.StepResult`."""
+    """Read a step's results into the tables of `kinarm.episodes.StepResult`."""
     episodes = session.episodes
     for e in range(contact.shape[0]):
         stepped = episodes.steps[e] == episodes.stop[e]
@@ -231,14 +227,14 @@ def results_of_step(
 
 @lean_kernel
 def refuse(rows: NDArray[np.int64], session: Session) -> None:
-    """End episodes whose step Coal found to touch something."""
+    """End episodes whose step Coal found to touch."""
     for index in range(rows.shape[0]):
         refuse_step(rows[index], session.rules, session.episodes)
 
 
 @inlined
 def refuse_step(e: int, rules: Rules, episodes: Episodes) -> None:
-    """End an episode whose step touches something: the arm stays where it is."""
+    """End an episode whose step touches something; the arm stays."""
     episodes.status[e] = COLLISION
     episodes.steps[e] += 1
     distance = episodes.distance[e]

@@ -1,6 +1,6 @@
-"""Kernels that screen configurations for contact, and those that draw and deal starts.
+"""Kernels that screen configurations for contact, and draw and deal starts.
 
-Starts are few numbers, for which calls of NumPy take longer than the sums.
+Starts are few numbers, for which NumPy's calls take longer than the sums.
 """
 
 import math
@@ -21,14 +21,14 @@ from kinarm.kernels.session import Alone, Block, put, take
 def propose_starts(
     rows: NDArray[np.int64], uniforms: Array, lower: Array, extent: Array, starts: Array
 ) -> Array:
-    """Place the first joints of some starts within their range, and return these starts.
+    """Place the first joints of some starts in their range, and return these starts.
 
     Parameters
     ----------
     rows, uniforms : ndarray, of int, shape (n_rows,), and (n_rows, n_actuated)
-        Which of the starts, and numbers in [0, 1).
+        Which starts, and numbers in [0, 1).
     lower, extent, starts : ndarray, shape (n_joints,), twice, and (n, n_joints)
-        Lower ends and widths of the ranges, and all starts, which are changed [rad or m].
+        Lower ends and widths of the ranges, and all starts, changed in place [rad or m].
     """
     for i in range(rows.shape[0]):
         for joint in range(uniforms.shape[1]):
@@ -44,14 +44,14 @@ def rejected_rows(
     touching: NDArray[np.bool_],
     tolerance: float,
 ) -> NDArray[np.int64]:
-    """Rows of the starts that touch something or have their tool at the goal already.
+    """Rows of starts that touch something or whose tool is at the goal.
 
     Parameters
     ----------
     rows, goals : ndarray, of int, shape (n_rows,), and (n, 3)
-        Which of the starts are in question, and the goals of all [m].
+        Which starts are in question, and all goals [m].
     tools, touching : ndarray, shape (n_rows, 3), and of bool, shape (n_rows,)
-        Their tool points [m], and whether they touch something.
+        Their tool points [m], and whether they touch.
     tolerance : float
         Distance within which a goal is reached [m].
     """
@@ -75,18 +75,18 @@ def deal(
     q: Array,
     goal: Array,
 ) -> bool:
-    """Copy the next scenario of each of some arms to its row of ``q`` and ``goal``.
+    """Copy the next scenario of some arms to their rows of ``q`` and ``goal``.
 
-    Nothing is dealt, and the answer is no, where one of them has none left.
+    If one of them has none left, nothing is dealt, and the result is False.
 
     Parameters
     ----------
     rows : ndarray of int, shape (n,)
         The arms.
     taken, drawn : ndarray of int, shape (n_arms,)
-        How many scenarios each arm was dealt, and how many were drawn for it.
+        How many scenarios were dealt to each arm, and drawn for it.
     starts, goals : ndarray, shape (n_arms, n_kept, n_joints) and (n_arms, n_kept, 3)
-        Scenarios; the one of number k has the place k modulo n_kept.
+        Scenarios; that of number k is at k modulo n_kept.
     q, goal : ndarray, shape (n_arms, n_joints) and (n_arms, 3)
         Where to.
     """
@@ -116,12 +116,12 @@ def screen(
     free: NDArray[np.bool_],
     touching: NDArray[np.bool_],
 ) -> int:
-    """Find the tool points of configurations, and which surely are free or touch.
+    """Find tool points of configurations, and which surely are free or touch.
 
     Parameters
     ----------
     first, last : int
-        Range of rows to work on.
+        Range of rows.
     block, alone, chain, shapes
         Work space, the arm, and what may touch.
     configurations : ndarray, shape (n, n_joints)
@@ -132,7 +132,7 @@ def screen(
     Returns
     -------
     int
-        Of how many one of both is proven; Coal has to decide about the others.
+        Of how many one is proven; Coal decides about the others.
     """
     n_joints, tool = configurations.shape[1], chain.tool
     n_proven = 0

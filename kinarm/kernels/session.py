@@ -1,7 +1,4 @@
-"""Everything that a batch of episodes needs, bound into one object, and its work space.
-
-That is a block of episodes, side by side in lanes, and space for a single one of them.
-"""
+"""Everything of a batch of episodes in one object, with work space for a block in lanes."""
 
 from functools import cache
 from typing import Any, NamedTuple, TypeAlias
@@ -21,14 +18,14 @@ from kinarm.kernels.records import Fixed, Layout, Record, Shapes, table
 ONE, THREE = Fixed(1), Fixed(3)
 
 Block: TypeAlias = Any
-"""Work space of a block of episodes, a record of lanes: see `layouts`."""
+"""Work space of a block of episodes, a record of lanes (`layouts`)."""
 
 Alone: TypeAlias = Any
-"""Work space for a single episode of a block, a record of numbers: see `layouts`."""
+"""Work space for an episode of a block, a record of numbers (`layouts`)."""
 
 
 def work_space(**sizes: int) -> tuple[Block, Alone]:
-    """Records of a block, and of the space for a single episode; sizes are those of `layouts`."""
+    """Records of a block and a single episode's space, of sizes as in `layouts`."""
     block, alone = layouts(**sizes)
     return block.record(), alone.record()
 
@@ -44,52 +41,51 @@ def layouts(
     own: int = 0,
     summed: int = 0,
 ) -> tuple[Layout, Layout]:
-    """Arrays of a block and of the space for a single episode, and how they lie in memory.
+    """Layouts of a block and of a single episode's space.
 
-    Arrays of lanes are seen with one axis more, that of the episodes, by
-    `kinarm.kernels.lanes.as_numbers`.
+    `kinarm.kernels.lanes.as_numbers` gives arrays of lanes one axis more, of the episodes.
 
     Parameters
     ----------
     n_joints, n_actuated, n_observations, n_pairs, n_terms, widest : int
-        Sizes of arm, scene, reward and networks; 0 of what a kernel does without.
+        Sizes of arm, scene, reward and networks; 0 if a kernel does without.
     own : int
-        Parameters of an episode's network, if not all have the same.
+        Parameters of an episode's own network.
     summed : int
-        Entries of the observation that are summed, all or none.
+        Summed entries of the observation, all or none.
     """
     block = {
-        # Configuration, where the step leads [rad or m], and the goal's position [m].
+        # Configuration, target of the step [rad or m], and goal [m].
         "q": (ONE, n_joints),
         "target": (ONE, n_joints),
         "goal": (ONE, THREE),
-        # Observation, and as a mirrored network sees it.
+        # Observation, and its mirror image for networks.
         "observation": (ONE, n_observations),
         "seen": (ONE, n_observations),
-        # Forward kinematics before and after the step; which is which changes from step to step.
+        # Poses before and after the step, which swap from step to step.
         "before": (n_joints + 1, Fixed(POSE)),
         "after": (n_joints + 1, Fixed(POSE)),
-        # Separating plane of each pair, and the height above it; the last row is work space.
+        # Separating plane of each pair, with its height; the last row is work space.
         "planes": (n_pairs + 1, Fixed(PLANE)),
-        # Height before the step, its bend, and the bound that follows [m].
+        # Height before the step, bend, and the bound of both [m].
         **dict.fromkeys(("height", "bend", "bound"), (n_pairs,)),
-        # How far an axis (column) moves in the step, times itself and twice those before it, from
-        # the first one (row) that counts [rad^2].
+        # Move of an axis (column) in the step, times itself and twice those before it, from the
+        # first one (row) that counts [rad^2].
         "twist": (n_actuated, n_actuated),
-        # Fractions of the step limits; layers of networks; parameters of own networks.
+        # Fractions of step limits; layers and own parameters of networks.
         "action": (ONE, n_actuated),
         "hidden": (Fixed(2), widest),
         "weights": (ONE, own),
-        # Distance to the goal [m], return, steps taken, and step at which to hand back; 1 where
-        # there is an episode, and where its step under way was found free by Coal, else 0.
+        # Distance to the goal [m], return, steps taken, and step to hand back; 1 for an episode
+        # that is there, and for a step under way that Coal found free, else 0.
         **dict.fromkeys(("distance", "total", "steps", "stop", "alive", "cleared"), (ONE,)),
         # Weighted terms of the last reward.
         "terms": (ONE, n_terms),
-        # Sums of the observations acted upon, less the shift, and of their squares.
+        # Sums of the observations acted upon, less the shift, and their squares.
         "moments": (Fixed(2), summed),
     }
     alone = {
-        # A configuration, the poses before the step or between, and after it, and a plane.
+        # A configuration, poses before the step or between and after it, and a plane.
         "q": (ONE, n_joints),
         "before": (n_joints + 1, Fixed(POSE)),
         "after": (n_joints + 1, Fixed(POSE)),
@@ -100,7 +96,7 @@ def layouts(
     }
     in_lanes: Shapes = {name: (lanes, shape) for name, shape in block.items()}
     numbers: Shapes = {name: (types.float64, shape) for name, shape in alone.items()}
-    # Which episode is in a lane, -1 where none is; pairs in question, and at which configurations.
+    # Episode in each lane, -1 for none; open pairs, and configurations of each.
     in_lanes["row"] = (types.int64, (Fixed(LANES),))
     numbers["listed"] = (types.int64, (n_pairs + 1, Fixed(2)))
     return Layout("Block", in_lanes), Layout("Alone", numbers)
@@ -108,7 +104,7 @@ def layouts(
 
 @inlined
 def put(rows: Array, e: int, held: Array, row: int, lane: int) -> None:
-    """Copy a row of an array into a lane of a row of an array of lanes."""
+    """Copy a row into a lane of a row of lanes."""
     numbers = as_numbers(held)
     for i in range(numbers.shape[1]):
         numbers[row, i, lane] = rows[e, i]
@@ -116,7 +112,7 @@ def put(rows: Array, e: int, held: Array, row: int, lane: int) -> None:
 
 @inlined
 def take(held: Array, row: int, lane: int, rows: Array, e: int) -> None:
-    """Copy a lane of a row of an array of lanes into a row of an array."""
+    """Copy a lane of a row of lanes into a row."""
     numbers = as_numbers(held)
     for i in range(numbers.shape[1]):
         rows[e, i] = numbers[row, i, lane]
@@ -124,14 +120,14 @@ def take(held: Array, row: int, lane: int, rows: Array, e: int) -> None:
 
 @inlined
 def take_rows(held: Array, lane: int, rows: Array) -> None:
-    """Copy a lane of an array of lanes into as many rows as an array has."""
+    """Copy a lane of rows of lanes into all rows of an array."""
     for row in range(rows.shape[0]):
         take(held, row, lane, rows, row)
 
 
 @inlined
 def load_episode(e: int, lane: int, control: Control, episodes: Episodes, block: Block) -> None:
-    """Put an episode into a lane; its observation only if something depends on it."""
+    """Put an episode into a lane; its observation only if needed."""
     put(episodes.q, e, block.q, 0, lane)
     put(episodes.target, e, block.target, 0, lane)
     put(episodes.goal, e, block.goal, 0, lane)
@@ -153,7 +149,7 @@ def load_episode(e: int, lane: int, control: Control, episodes: Episodes, block:
 
 @inlined
 def store_episode(lane: int, e: int, episodes: Episodes, block: Block) -> None:
-    """Hand an episode back from a lane, which is then free."""
+    """Hand an episode back and free its lane."""
     steps = int(as_numbers(block.steps)[0, lane])
     take(block.q, 0, lane, episodes.q, e)
     take(block.target, 0, lane, episodes.target, e)
@@ -170,7 +166,7 @@ def store_episode(lane: int, e: int, episodes: Episodes, block: Block) -> None:
 
 
 class SessionFields(NamedTuple):
-    """The records that kernels find as attributes of a `Session`."""
+    """Records in a `Session`, which kernels see as attributes."""
 
     chain: Chain
     shapes: ContactShapes
@@ -182,14 +178,14 @@ class SessionFields(NamedTuple):
 
 
 class Session(Record):
-    """Arm, scene, rules, source of actions and episodes, all records, and work space.
+    """Arm, scene, rules, source of actions, episodes and work space, as records.
 
-    One thread at a time may use it; others need one `of_thread`.
+    Each thread needs its own, from `of_thread`.
 
     Attributes
     ----------
     control, episodes : Control and Episodes
-        Source of actions and episodes, as Python sees them.
+        As Python sees them.
     """
 
     def __init__(self, chain: Any, shapes: Any, rules: Any, control: Any, episodes: Any) -> None:
@@ -211,18 +207,18 @@ class Session(Record):
         self._others: list[Session] = []
 
     def of_thread(self, number: int) -> "Session":
-        """Which session one of several threads is to use, counted from 0: this one, or another."""
+        """The session of a thread; this one is that of thread 0."""
         while len(self._others) < number:
             self._others.append(Session(*self.values[:5]))
         return self._others[number - 1] if number else self
 
     def refill(self, control: Control, starts: Array, goals: Array, shift: Array | None) -> bool:
-        """Take other networks, starts and goals, if they are as many and of the same form.
+        """Take networks, starts and goals, if they have the same number and form.
 
         Parameters
         ----------
         control, starts, goals, shift
-            As for `kinarm.World.episodes`, and the networks.
+            The networks, and as for `kinarm.World.episodes`.
         """
         episodes = self.episodes
         pairs = zip(self.control, control, strict=True)
@@ -245,9 +241,9 @@ class Session(Record):
 
 @instruction
 def take_number(_: Any, counters: types.Array, place: types.Integer) -> Any:
-    """Raise one of some counters, an array of int64, by one; returns what it was.
+    """Raise a counter, of an array of int64, by one; return its former value.
 
-    Threads that do so at the same time get different numbers.
+    Threads get different numbers.
     """
 
     def code(context: Any, builder: Any, _signature: Any, arguments: Any) -> Any:

@@ -1,4 +1,4 @@
-"""The viewer: pictures, recordings as pages that play offline, and scenes that are served live."""
+"""The viewer: pictures, pages of recordings, and live scenes."""
 
 import lazy_loader
 

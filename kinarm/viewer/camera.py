@@ -15,11 +15,10 @@ from kinarm.scene import Scene
 FIELD_OF_VIEW = 30.0
 TARGET, EYE = (0.05, 0.1, 0.38), (-2.42, 1.9, 1.5)
 """Middle of the picture, and the camera relative to it, if goals lie on the left [m]: as on the
-replay page, a little farther so that an upright arm fits in."""
+replay page, but with room for an upright arm."""
 
 NEAR, FAR = 1.0, 1.45
-"""Stages whose radius lies between these are seen from there; smaller ones from nearer by, larger
-ones from farther away [m]."""
+"""Stages of a radius between these are seen from there; others scale that [m]."""
 
 
 class Camera(NamedTuple):
@@ -28,7 +27,7 @@ class Camera(NamedTuple):
     Attributes
     ----------
     position, target : tuple of float
-        Where it stands and what is in the middle of the picture, in the world [m].
+        Its place and the middle of the picture, in the world [m].
     field_of_view : float
         Angle between the picture's upper and lower edges [degrees].
     """
@@ -39,9 +38,9 @@ class Camera(NamedTuple):
 
     @classmethod
     def of_replays(cls, problem: ReachProblem, arm: Arm | None = None) -> "Camera":
-        """Stand where the replay page does: behind the arm, on the side of most goals.
+        """Stand as on the replay page: behind the arm, on the side of most goals.
 
-        The problem's arm is loaded if it is not given.
+        Without an arm, the problem's is loaded.
         """
         regions = [problem.scene.goal_region(name) for name in problem.task.goal_regions]
         across = sum(region.lower[1] + region.upper[1] for region in regions)
@@ -53,12 +52,12 @@ class Camera(NamedTuple):
 
     @classmethod
     def checked(cls, camera: "CameraLike") -> "Camera":
-        """Make a camera of a mapping of its attributes or a sequence of their values.
+        """Make a camera of a mapping or a sequence of its values.
 
         Raises
         ------
         InvalidInputError
-            If it is neither, or a camera that sees nothing.
+            If it is neither, or the camera sees nothing.
         """
         try:
             given = cls(**camera) if isinstance(camera, Mapping) else cls(*camera)
@@ -81,8 +80,8 @@ class Camera(NamedTuple):
     def projection(self, width: int, height: int) -> NDArray[np.float64]:
         """World to picture, shape (3, 4).
 
-        A point [x, y, z, 1] goes to its column and row in a picture of a size [pixels], both times
-        its distance along the line of sight, and that distance [m].
+        A point [x, y, z, 1] goes to its column and row [pixels], both times its distance along the
+        line of sight, and that distance [m].
         """
         position, target = np.array(self.position), np.array(self.target)
         ahead = (target - position) / np.linalg.norm(target - position)
@@ -98,7 +97,7 @@ class Camera(NamedTuple):
 
 
 def stage_scale(arm: Arm, scene: Scene) -> float:
-    """How far away cameras stand that show an arm and where goals lie; 1 if that is about 1 m."""
+    """Scale of a camera's distance for arm and goals; 1 for a reach of about 1 m."""
     corners = [corner for region in scene.goal_regions for corner in (region.lower, region.upper)]
     radius = max([arm.reach, *(float(np.linalg.norm(corner)) for corner in corners)])
     return radius / min(max(radius, NEAR), FAR)

@@ -1,4 +1,4 @@
-"""Draw an arm and its scene into a Meshcat window: a page in the making, or a live one."""
+"""Draw an arm and its scene into a Meshcat window, for pages and live."""
 
 import struct
 import threading
@@ -45,18 +45,17 @@ GRID_COLOUR = 0xC6CCD3
 BACKGROUND = [0.93, 0.945, 0.96]
 
 CLUTTER = ("/Axes", "/Grid", "/Lights/PointLightPositiveX", "/Lights/PointLightNegativeX")
-"""Objects that Meshcat shows by default and a replay does not."""
+"""Meshcat's default objects that replays do not show."""
 DIMMED = {"/Lights/AmbientLight/<object>": 0.42, "/Lights/FillLight/<object>": 0.2}
 FIELD_OF_VIEW, CAMERA_PLACE = 32, (-2.4, 1.6, 1.9)
-"""Of the live page [degrees, m], in the frame of three.js, whose y axis points up."""
+"""Of the live page [degrees, m]; in three.js, y points up."""
 
 
 class DrawnScene:
     """The drawing commands that still count; any thread may add some.
 
-    A command takes the place of an earlier one for the same part of the same node, so that the
-    scene grows with what is seen, not with time, and a page that is slow leaves out what is past.
-    The same drawing gives the same bytes.
+    A command replaces an earlier one for the same part of a node: the scene grows with what is
+    seen, not with time. The same drawing gives the same bytes.
 
     Attributes
     ----------
@@ -75,7 +74,7 @@ class DrawnScene:
         self.add(command.lower())
 
     def add(self, command: Mapping[str, Any]) -> None:
-        """Take a command as it is told; each is led by its length then."""
+        """Take a command and put its length before it."""
         path, kind, packed = command["path"], command["type"], umsgpack.packb(command)
         key = (path, kind, command.get("property", ""))
         below = f"{path.rstrip('/')}/"
@@ -83,14 +82,14 @@ class DrawnScene:
             for other in [*self._commands] if kind == "delete" else ():
                 if other[0] == path or other[0].startswith(below):
                     del self._commands[other]
-            self._commands.pop(key, None)  # so that the order is that of the latest commands
+            self._commands.pop(key, None)  # so that the latest commands come last
             self._last += 1
             self._commands[key] = self._last, struct.pack("<I", len(packed)) + packed
             self._changed.notify_all()
 
     @property
     def content(self) -> bytes:
-        """All commands that count now."""
+        """All commands that count."""
         return b"".join(told for _, told in self._commands.values())
 
     def close(self) -> None:
@@ -100,7 +99,7 @@ class DrawnScene:
             self._changed.notify_all()
 
     def changes(self) -> Iterator[bytes]:
-        """All commands that count now, and then those that come, until the scene is closed."""
+        """All commands that count, then new ones, until the scene is closed."""
         seen = 0
         while True:
             with self._changed:
@@ -125,12 +124,12 @@ class _Described(Object):
 
 
 def put(window: Visualizer, finish: Finish, *meshes: Mesh) -> None:
-    """Show meshes with one finish; corners lie on a grid of 65535 steps along the longest side."""
+    """Show meshes with one finish; the longest side has 65535 steps."""
     vertices, normals, faces = Mesh.joined(meshes).with_normals()
     low, high = vertices.min(axis=0), vertices.max(axis=0)
     middle, step = (low + high) / 2, max((high - low).max(), 1e-9) / 65534
     transform = np.diag([step, step, step, 1.0])
-    transform[3, :3] = middle  # transposed: three.js reads it column by column
+    transform[3, :3] = middle  # transposed: three.js reads by columns
     position = np.round((vertices - middle) / step).astype(np.int16)
     normal = np.round(127 * normals).astype(np.int8)
     index = faces.astype(np.uint16 if faces.max(initial=0) < 2**16 else np.uint32)
@@ -188,7 +187,7 @@ def _show_sun(window: Visualizer) -> None:
 
 
 EXTENSIONS = {"int8": 0x11, "int16": 0x13, "uint16": 0x14, "uint32": 0x16, "float32": 0x17}
-"""Codes of MessagePack's extensions that three.js reads as arrays of a type."""
+"""Codes of MessagePack's extensions that three.js reads as typed arrays."""
 
 
 def _typed_array(array: NDArray[np.generic], size: int) -> dict[str, object]:
@@ -200,14 +199,14 @@ def _typed_array(array: NDArray[np.generic], size: int) -> dict[str, object]:
 
 
 def draw_stage(window: Visualizer, arm: Arm, scene: Scene) -> list[Visualizer]:
-    """Draw surroundings, the ball that marks a contact, and an arm; return the arm's frames.
+    """Draw surroundings, the ball at a contact, and an arm; return the arm's frames.
 
     Parameters
     ----------
     window : meshcat.Visualizer
         Where to draw.
     arm, scene : Arm, Scene
-        The arm, and what stands around it.
+        The arm, and its surroundings.
     """
     draw_surroundings(window, scene)
     put(window["flash"], FLASH, capsule(0.0, stage_scale(arm, scene) * FLASH_RADIUS))
@@ -246,23 +245,20 @@ def _grid_lines() -> NDArray[np.float64]:
 
 
 def aim_camera(window: Visualizer, scale: float = 1.0) -> None:
-    """Look at the arm from behind its right side; see `kinarm.viewer.camera.stage_scale`."""
+    """Look from behind the arm's right; see `kinarm.viewer.camera.stage_scale`."""
     camera = window["/Cameras/default/rotated/<object>"]
     camera.set_property("fov", FIELD_OF_VIEW)
     camera.set_property("position", [scale * value for value in CAMERA_PLACE])
 
 
 def draw_goal(window: Visualizer, problem: ReachProblem) -> None:
-    """The cube, and a halo within which the goal counts as reached, about the origin."""
+    """The cube, and the halo of its tolerance, about the origin."""
     put(window["cube"], CUBE, cube_mesh(problem.scene))
     put(window["halo"], HALO, capsule(0.0, problem.task.tolerance))
 
 
 def draw_arm(window: Visualizer, arm: Arm) -> list[Visualizer]:
-    """Draw an arm as nested groups: the base and the joints, which are returned.
-
-    A joint's transform is that in its parent.
-    """
+    """Draw an arm as nested groups; return base and joints."""
     frames = [window]
     for number in range(1, arm.n_joints + 1):
         frames.append(frames[-1][f"axis_{number}"])
@@ -284,9 +280,9 @@ def draw_trace(
     window : meshcat.Visualizer
         Where to draw.
     points : ndarray, shape (n, 3)
-        Where the tool has been [m].
+        Positions of the tool [m].
     outcome : str, optional
-        How the episode ended, if it has, which decides about the colour.
+        How the episode ended, if it has.
     scale : float
         Size of the stage; see `stage_scale`.
     """

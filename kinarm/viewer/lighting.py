@@ -1,7 +1,7 @@
 """Light on a stage, as on the replay page: sun, fill, sky, and a bright room that is reflected.
 
-Kernels find the light that a place of a surface sends out, by three.js' standard material. Lengths
-are in metres, shapes of arrays in brackets, and colours linear red, green and blue.
+Kernels light surfaces by three.js' standard material. Lengths are in metres, shapes of arrays in
+brackets, and colours linear red, green and blue.
 """
 
 import math
@@ -17,7 +17,7 @@ from kinarm.viewer.parts import Finish, channels, to_linear
 
 SUN_PLACE = (-2.0, -1.0, 3.4)
 FILL_PLACE = (-2.5, 1.8, -2.2)
-"""Places of the lights, which shine on the origin from afar [m]."""
+"""Places of the lights, which shine on the origin [m]."""
 
 SUN, SUN_INTENSITY = 0xFFF6E8, 0.62
 FILL, FILL_INTENSITY = 0xDCE8FF, 0.3
@@ -30,13 +30,13 @@ ROOM = (
     (0xE8F0FF, (0.1, 6, 3), (-5.5, 0, 2.5)),
     (0xFFF4E4, (6, 0.1, 2.4), (0, -5.6, 3)),
 )
-"""Colours, sizes and centres [m] of the boxes whose light is reflected: walls, then panels."""
+"""Colours, sizes and centres [m] of reflected boxes: walls, then panels."""
 
 SHADOW_REACH = 1.75
 """Half the extent of the shadow map, about the origin [m]."""
 
 DIRECTIONS = 4096
-"""From which light of the room is summed up."""
+"""Directions from which the room's light is summed up."""
 
 IRRADIANCE_NODES, REFLECTION_NODES = 17, 33
 """Nodes along each side of the octahedral maps."""
@@ -55,7 +55,7 @@ class Materials(NamedTuple):
 
     colour, emission (n, 3): reflected and emitted light.
     roughness, metalness (n,): in 0..1.
-    reflections (n, k, k, 3): octahedral maps of the room's light, blurred as in such a mirror.
+    reflections (n, k, k, 3): octahedral maps of the room's light, blurred by such a mirror.
     """
 
     colour: Array
@@ -116,7 +116,7 @@ def _look_up(table: Array, cell: Cell, channel: int) -> float:
 
 @inlined
 def sunlit(lights: Lights, place: Vector) -> float:
-    """Share of the sun that reaches a place, averaged over three by three texels."""
+    """Share of the sun that reaches a place, averaged over 3 x 3 texels."""
     x, y, z = place
     m, shadow = lights.sunward, lights.shadow
     u = m[0, 0] * x + m[0, 1] * y + m[0, 2] * z + m[0, 3] - 1.5
@@ -143,8 +143,8 @@ def _shine(
 ) -> Vector:
     """Light from afar on a surface.
 
-    Returns the cosine of the light's angle, and the cosine times GGX with Smith's visibility, in
-    two parts by Schlick's Fresnel term: for a mirror of colour 1, and for any surface.
+    Returns the cosine of the light's angle, and it times GGX with Smith's visibility, in two parts
+    by Schlick's Fresnel term: for a mirror of colour 1, and for any surface.
     """
     x, y, z = normal
     towards = lights.directions
@@ -175,7 +175,7 @@ def light_up(
     """Light that a surface sends to the eye: red, green and blue, linear.
 
     The room's light follows Karis' fit of what a rough surface mirrors, and Fdez-Aguera's of what
-    it mirrors more than once.
+    it mirrors repeatedly.
 
     Parameters
     ----------
@@ -192,7 +192,7 @@ def light_up(
     along = x * view[0] + y * view[1] + z * view[2]
     facing = max(along, 0.0)
 
-    # How a rough surface mirrors the room: once, in parts by its colour, and what is lost.
+    # How a rough surface mirrors the room once, in parts by its colour, and what is lost.
     bend = math.exp(-9.28 * LOG_2 * facing)
     bend = min((1.0 - roughness) ** 2, bend) * (1.0 - roughness) + 0.0425 - 0.0275 * roughness
     slope = 1.04 - 0.572 * roughness - 1.04 * bend  # per mirrored light of a colour
@@ -233,7 +233,7 @@ def light_up(
 
 
 def lit(finishes: Sequence[Finish], texels: int) -> tuple[Materials, Lights]:
-    """Finishes in the replay page's light, with an empty shadow map of some texels a side."""
+    """Finishes in the replay page's light, with an empty shadow map."""
     places = np.array([SUN_PLACE, FILL_PLACE])
     directions = places / np.linalg.norm(places, axis=1, keepdims=True)
     right = np.cross((0.0, 0.0, 1.0), directions[0])
@@ -280,7 +280,7 @@ def reflection_map(roughness: float) -> Array:
 
 
 def _blurred(nodes: int, lobe: Callable[[Array], Array]) -> Array:
-    """Mean light of the room, weighted by a function of the cosine to each node's direction."""
+    """Mean light of the room, weighted by a function of the cosine."""
     directions = _even_directions()
     radiance = _room_radiance(directions)
     weights = lobe(_node_directions(nodes) @ directions.T)
@@ -289,7 +289,7 @@ def _blurred(nodes: int, lobe: Callable[[Array], Array]) -> Array:
 
 
 def _even_directions() -> Array:
-    """Unit vectors that are spread evenly (Fibonacci's spiral), shape (n, 3)."""
+    """Evenly spread unit vectors (Fibonacci's spiral), shape (n, 3)."""
     number = np.arange(DIRECTIONS) + 0.5
     z = 1 - 2 * number / DIRECTIONS
     turn = np.pi * (1 + np.sqrt(5)) * number
@@ -298,7 +298,7 @@ def _even_directions() -> Array:
 
 
 def _node_directions(nodes: int) -> Array:
-    """Unit vectors of the nodes of an octahedral map, row by row, shape (nodes ** 2, 3)."""
+    """Unit vectors of an octahedral map's nodes by rows, shape (nodes ** 2, 3)."""
     v, u = np.meshgrid(*[np.linspace(-1, 1, nodes)] * 2, indexing="ij")
     z = 1 - np.abs(u) - np.abs(v)
     side_u, side_v = np.copysign(1, u), np.copysign(1, v)
@@ -310,7 +310,7 @@ def _node_directions(nodes: int) -> Array:
 
 
 def _room_radiance(directions: Array) -> Array:
-    """Colours of the boxes' sides that are seen from the origin, shape (n, 3)."""
+    """Colours of the boxes seen from the origin, shape (n, 3)."""
     nearest = np.full(len(directions), np.inf)
     colours = np.zeros((len(directions), 3))
     with np.errstate(divide="ignore"):

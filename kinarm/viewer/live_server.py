@@ -1,7 +1,4 @@
-"""A scene served to browsers of this machine while it is drawn, by threads of this process.
-
-And a problem in it: an arm that moves on command.
-"""
+"""Scenes and problems with moving arms, served live to browsers."""
 
 import errno
 import sys
@@ -39,18 +36,18 @@ FILES = {
     "/meshcat.js": ("text/javascript; charset=utf-8", "meshcat", "viewer/dist/main.min.js"),
     "/scene": ("application/octet-stream", "", ""),
 }
-"""Type, package and name of what a page consists of, by address; the scene is no file."""
+"""Type, package and name of files, by address; the scene is none."""
 
 
 class LiveServer(ThreadingTCPServer):
-    """Serves a scene to browsers on this machine while it is drawn; use it in a ``with`` block.
+    """Serves a scene to browsers on this machine while it is drawn; for a ``with`` block.
 
-    Each visitor is answered by a thread, which ends with the process, however that ends.
+    A thread answers each visitor until the process ends.
 
     Parameters
     ----------
     port : int
-        Port to listen on; the next free one if it is taken. The attribute is the one taken.
+        Port, or the next free one, which the attribute tells.
 
     Attributes
     ----------
@@ -84,7 +81,7 @@ class LiveServer(ThreadingTCPServer):
 
     @property
     def address(self) -> str:
-        """Where a browser finds it."""
+        """Address for a browser."""
         return f"http://{HOST}:{self.port}/"
 
     def close(self) -> None:
@@ -103,7 +100,7 @@ class LiveServer(ThreadingTCPServer):
 
 
 class _Visit(BaseHTTPRequestHandler):
-    """Answers a visitor with a file of the page, or with the scene as a stream without end."""
+    """Answers with a file of the page, or streams the scene."""
 
     server: LiveServer
 
@@ -127,7 +124,7 @@ class _Visit(BaseHTTPRequestHandler):
 
 
 class LiveStage:
-    """Surroundings, goal, arm and the way of its tool on a live page."""
+    """Surroundings, goal, arm and its tool's way on a live page."""
 
     def __init__(self, server: LiveServer, problem: ReachProblem, arm: Arm) -> None:
         self.server, self._arm, self._data = server, arm, arm.model.createData()
@@ -139,7 +136,7 @@ class LiveStage:
         self._frames = draw_arm(window["arm"], arm)[1:]
 
     def begin(self, configuration: NDArray[np.float64], goal: ArrayLike) -> None:
-        """Show a start and a goal [rad or m, m], and no way yet."""
+        """Show a start and a goal [rad or m, m], without a way."""
         place = np.eye(4)
         place[:3, 3] = goal
         self.server.window["goal"].set_transform(place)
@@ -153,10 +150,10 @@ class LiveStage:
             frame.set_transform(self._data.liMi[joint].homogeneous)
 
     def draw_trace(self, points: ArrayLike, outcome: str | None) -> None:
-        """Show the way of the tool, shape (n, 3) [m], in the colour of an outcome."""
+        """Show the tool's way, shape (n, 3) [m], in an outcome's colour."""
         draw_trace(self.server.window["trace"], np.asarray(points), outcome, self._scale)
 
     def pace(self, seconds: float) -> None:
-        """Wait until some time has passed since the last call was over [s]."""
+        """Wait until a time has passed since the last call ended [s]."""
         time.sleep(max(self._due + seconds - time.monotonic(), 0.0))
         self._due = time.monotonic()

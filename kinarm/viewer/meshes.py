@@ -1,4 +1,4 @@
-"""Triangle meshes from profiles and primitives, with normals that keep sharp edges sharp."""
+"""Triangle meshes of profiles and primitives, with sharp edges."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 Array = NDArray[np.float64]
 
 SEGMENTS = 40
-"""Straight pieces that a full circle is made of."""
+"""Straight pieces of a full circle."""
 
 CREASE = np.cos(np.deg2rad(38.0))
 """Faces that meet at a larger angle than this keep their edge."""
@@ -25,7 +25,7 @@ class Mesh:
     Attributes
     ----------
     vertices, normals : ndarray, shape (n, 3)
-        Corners [m], and unit normals there; `with_normals` finds these if they are not given.
+        Corners [m], and unit normals there; `with_normals` finds missing ones.
     faces : ndarray of int, shape (m, 3)
         Indices of corners, anticlockwise seen from outside.
     """
@@ -51,13 +51,13 @@ class Mesh:
         return cls(np.concatenate(vertices), np.concatenate(joined), np.concatenate(normals))
 
     def welded(self) -> Mesh:
-        """Join corners that are less than 1e-6 m apart, and drop faces that have no area then."""
+        """Join corners less than 1e-6 m apart, and drop faces without area."""
         places, welded = np.unique(np.round(self.vertices, 6), axis=0, return_inverse=True)
         faces = welded.reshape(-1)[self.faces]
         return Mesh(places, faces[(faces != np.roll(faces, 1, axis=1)).all(axis=1)])
 
     def with_normals(self) -> tuple[Array, Array, NDArray[np.int64]]:
-        """Vertices, normals, faces: split where faces meet at an edge, each corner has a normal."""
+        """Vertices, normals and faces, with corners split at edges."""
         if self.normals is not None:
             return self.vertices, self.normals, self.faces
         places, welded = np.unique(np.round(self.vertices, 6), axis=0, return_inverse=True)
@@ -72,9 +72,9 @@ class Mesh:
 
 
 def _corner_normals(corners: NDArray[np.int64], weighted: Array, flat: Array) -> Array:
-    """Mean normal, at each corner of each face, of the faces that meet there without an edge."""
+    """Mean normal, at each face's corners, of the faces that meet without an edge."""
     empty = np.repeat(np.linalg.norm(weighted, axis=1) == 0, 3)
-    solid = np.flatnonzero(~empty)  # of a trace at rest there are none, and thousands of others
+    solid = np.flatnonzero(~empty)  # else a trace at rest has thousands
     order = solid[np.argsort(corners[solid], kind="stable")]
     counts = np.bincount(corners[solid], minlength=corners.max(initial=-1) + 1)
     starts = np.cumsum(counts) - counts
@@ -91,9 +91,9 @@ def _corner_normals(corners: NDArray[np.int64], weighted: Array, flat: Array) ->
 
 
 def loft(rings: Array) -> Mesh:
-    """Skin a stack of closed rings, shape (n_rings, n_points, 3), and close it at both ends.
+    """Skin a stack of closed rings, shape (n_rings, n_points, 3), and close both ends.
 
-    Stretch by stretch; the points go anticlockwise seen against the direction of the stack [m].
+    Faces come stretch by stretch; points go anticlockwise seen against the stack's direction [m].
     """
     levels, around = rings.shape[:2]
     here = np.arange(around)
@@ -109,7 +109,7 @@ def loft(rings: Array) -> Mesh:
 
 
 def lathe(profile: Sequence[tuple[float, float]], axis: str = "z") -> Mesh:
-    """Turn a profile of positions and radii [m] about an axis through the origin."""
+    """Turn a profile of positions and radii [m] about an axis."""
     angle = np.linspace(0, 2 * np.pi, SEGMENTS, endpoint=False)
     position, radius = np.array(profile, dtype=float).T
     across = radius[:, None] * np.cos(angle), radius[:, None] * np.sin(angle)
@@ -119,12 +119,12 @@ def lathe(profile: Sequence[tuple[float, float]], axis: str = "z") -> Mesh:
 
 
 def cylinder(length: float, radius: float, chamfer: float, axis: str = "z") -> Mesh:
-    """A cylinder about the origin, along an axis, with chamfered rims [m].
+    """A cylinder about the origin with chamfered rims [m].
 
     Parameters
     ----------
     length, radius, chamfer, axis
-        Its sizes [m], and where it points: ``"x"``, ``"y"`` or ``"z"``.
+        Its sizes [m], and its direction: ``"x"``, ``"y"`` or ``"z"``.
     """
     half = length / 2
     profile = [(-half, radius - chamfer), (-half + chamfer, radius)]
@@ -132,10 +132,9 @@ def cylinder(length: float, radius: float, chamfer: float, axis: str = "z") -> M
 
 
 def housing(sections: Sequence[tuple[float, float, float, float, float]]) -> Mesh:
-    """Blend a casting through rounded cross sections that are stacked along z.
+    """Blend rounded cross sections that are stacked along z.
 
-    Each section states height, centre and half widths [m], and an exponent: 2 is an ellipse, larger
-    ones are boxier.
+    Each has height, centre and half widths [m], and an exponent: 2 is an ellipse, more is boxier.
     """
     angle = np.linspace(0, 2 * np.pi, SEGMENTS, endpoint=False)
     z, x, half_x, half_y, exponent = np.array(sections, dtype=float).T[..., None]
@@ -146,7 +145,7 @@ def housing(sections: Sequence[tuple[float, float, float, float, float]]) -> Mes
 
 
 def plate(outline: Sequence[ArrayLike], levels: Sequence[tuple[float, float]]) -> Mesh:
-    """Stack an outline of points x, z along y, at levels y where it has a scale [m, 1]."""
+    """Stack an outline of points x, z along y, by levels y and scales [m, 1]."""
     flat = np.array(outline, dtype=float)
     return loft(np.array([np.insert(scale * flat, 1, y, axis=1) for y, scale in levels]))
 
@@ -172,21 +171,21 @@ def _convex_hull(points: Array) -> Mesh:
 
 
 def capsule(length: float, radius: float) -> Mesh:
-    """A cylinder along z with half spheres at its ends; a sphere if its length is zero [m]."""
+    """A cylinder along z with half spheres at its ends; a sphere at length 0 [m]."""
     turn = np.linspace(0, np.pi / 2, 9)
     low = [(-length / 2 - radius * np.cos(t), radius * np.sin(t)) for t in turn]
     return lathe([*low, *[(-position, r) for position, r in reversed(low)]])
 
 
 def tube(points: ArrayLike, radius: float, sides: int = 6) -> Mesh:
-    """A tube along points, with 2 * ``sides`` faces for each stretch in turn.
+    """A tube along points, with 2 * ``sides`` faces per stretch.
 
     Parameters
     ----------
     points, radius : array_like, shape (n, 3), and float
-        At least two points, and the radius of the tube [m].
+        At least two points, and the tube's radius [m].
     sides : int
-        Corners of its cross section.
+        Corners of the cross section.
     """
     middle = np.asarray(points, dtype=float)
     forward = np.gradient(middle, axis=0)
@@ -207,7 +206,7 @@ def tube(points: ArrayLike, radius: float, sides: int = 6) -> Mesh:
 
 
 def from_coal(shape: coal.CollisionGeometry) -> Mesh:
-    """Skin of a primitive or a convex hull, in its own frame."""
+    """Skin of a primitive or convex hull in its own frame."""
     if isinstance(shape, coal.Box):
         return box(2 * np.array(shape.halfSide))
     if isinstance(shape, coal.Sphere):

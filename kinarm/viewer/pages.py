@@ -1,7 +1,4 @@
-"""Pages of recordings and of arms: one HTML file that needs no network, only a browser with WebGL.
-
-It holds Meshcat's viewer and all that it shows. The same recordings make the same page.
-"""
+"""Pages of recordings and arms: HTML that needs WebGL, but no network."""
 
 import base64
 import gzip
@@ -46,19 +43,19 @@ NOTEBOOK_FRAME = Markup(
 )
 
 NEARER = 0.8
-"""Distance of the camera from an arm alone, as a share of that in replays, which show more."""
+"""Camera's distance from an arm alone, as a share of that in replays."""
 
 BARE_GROUND = Scene(obstacles=(), goal_regions=())
 
 
 @dataclass(frozen=True)
 class HtmlPage:
-    """A page, whose ``html`` refers to nothing outside of itself. In a notebook it shows itself."""
+    """A page whose ``html`` refers to nothing else. A notebook shows it."""
 
     html: str
 
     def save(self, path: str | Path) -> None:
-        """Write the page to a file; if that fails, an existing one is left as it was."""
+        """Write the page to a file, or leave an existing one as it was."""
         write_text(path, self.html)
 
     def __repr__(self) -> str:
@@ -76,11 +73,11 @@ def page_html(
     Parameters
     ----------
     template, title
-        Name of the template, which extends ``page.html``, and of its style sheet; the page's title.
+        Name of the template, which extends ``page.html``, and of its style; the page's title.
     scene : bytes
-        Commands to Meshcat's viewer, each framed.
+        Framed commands to Meshcat's viewer.
     data : mapping
-        What the scripts have to know, in terms that JSON can hold.
+        What the scripts have to know, for JSON.
     parts : sequence of str
         Scripts, after those of every page.
     """
@@ -103,7 +100,7 @@ def page_html(
 
 
 def arm_data(arm: Arm, scene: Scene) -> dict[str, Any]:
-    """Describe an arm: its axes and tool, which joint carries which body, its colour and size."""
+    """Describe an arm: axes, tool, joints of its bodies, colour and size."""
     chain, painted = arm.chain, Counter[int]()
     columns = chain.translation, chain.rotation, chain.axis, chain.prismatic
     for part in arm_parts(arm):
@@ -122,7 +119,7 @@ def arm_data(arm: Arm, scene: Scene) -> dict[str, Any]:
 
 
 def _own_text(name: str) -> Markup:
-    """Text of a file beside this one, to be put into the page as it is."""
+    """Text of a file beside this one, for a page."""
     return Markup((resources.files("kinarm.viewer") / name).read_text(encoding="utf-8"))
 
 
@@ -137,7 +134,7 @@ def _gzip_base64(content: bytes) -> str:
 
 
 class ReplayPage(HtmlPage):
-    """A page that plays recordings. In a notebook it shows itself."""
+    """A page that plays recordings. A notebook shows it."""
 
 
 def replay_page(
@@ -153,14 +150,13 @@ def replay_page(
     Parameters
     ----------
     recordings : Recording or sequence of Recording
-        The recordings to play, one trial after the other.
+        The recordings, which play in order.
     path : str or Path, optional
-        File of the page; without it, no file is written.
+        File of the page, if it is to be written.
     ghosts : sequence of Recording
         Recordings of another policy in the same trials, shown in the same scene.
     groups : sequence of str
-        Group of each recording, for a list of the trials; recordings of a group follow each other.
-        Without groups there is no list.
+        Group of each recording in a list of trials; groups stay together. By default no list.
     heading : str
         Heading of the list.
 
@@ -169,7 +165,7 @@ def replay_page(
     InvalidInputError
         If there is no recording, or they cannot share a page.
     ArmError
-        If the recorded arm is missing, or has changed.
+        If the recorded arm is missing or has changed.
     """
     chosen = [recordings] if isinstance(recordings, Recording) else list(recordings)
     _check_recordings(chosen, ghosts)
@@ -191,7 +187,7 @@ def replay_path(
     goal: ArrayLike | None = None,
     name: str = "path",
 ) -> ReplayPage:
-    """Make a page that plays your own path; it ends at contact, and shows it.
+    """Make a page that plays your own path up to its contact, if any.
 
     Parameters
     ----------
@@ -204,7 +200,7 @@ def replay_path(
 
 
 def _check_recordings(recordings: Sequence[Recording], ghosts: Sequence[Recording]) -> None:
-    """See that recordings can share a page."""
+    """Refuse recordings that cannot share a page."""
     if not recordings:
         raise InvalidInputError("there is no recording to replay")
     first = recordings[0].problem
@@ -260,7 +256,7 @@ def _replay_html(
 
 
 def _trial_data(runs: Sequence[Recording]) -> dict[str, Any]:
-    """The trial that recordings are of, and what happened in it, as JSON."""
+    """A trial that was recorded, as JSON."""
     first, problem = runs[0], runs[0].problem
     return {
         "problem": problem.name,
@@ -284,7 +280,7 @@ def _trial_data(runs: Sequence[Recording]) -> dict[str, Any]:
 
 
 class ArmPage(HtmlPage):
-    """A page on which an arm can be moved. In a notebook it shows itself."""
+    """A page on which an arm can be moved. A notebook shows it."""
 
 
 def arm_page(
@@ -293,17 +289,17 @@ def arm_page(
     *,
     scene: Scene = BARE_GROUND,
 ) -> ArmPage:
-    """Make a page with a slider for each joint of an arm, which shows contact as it happens.
+    """Make a page with a slider for each joint of an arm, which shows contact.
 
-    The page tests the same pairs of shapes for contact as the simulator, in the browser. Its
-    verdicts are those of Coal, except for shapes that are less than 1e-6 m from touching.
+    In the browser, the page tests the same pairs of shapes as the simulator. Its verdicts are
+    Coal's, except for shapes that are less than 1e-6 m from touching.
 
     Parameters
     ----------
     arm : Arm, ArmSpecification, str or Path
-        The arm, where it stands; or what `kinarm.Arm.load` takes, mounted as the scene says.
+        The arm where it stands, or for `kinarm.Arm.load`, mounted as in the scene.
     path : str or Path, optional
-        File of the page; without it, no file is written.
+        File of the page, if it is to be written.
     scene : Scene
         The scene around the arm; the bare ground by default.
     """
@@ -316,7 +312,7 @@ def arm_page(
 
 
 def _arm_html(arm: Arm, scene: Scene) -> str:
-    """Page of an arm in a scene, with the shapes and pairs that are tested for contact."""
+    """Page of an arm in a scene, with shapes and tested pairs."""
     model = ContactModel.build(arm, scene)
     drawn = DrawnScene()
     frames = draw_stage(drawn.window, arm, scene)
@@ -337,9 +333,9 @@ def _arm_html(arm: Arm, scene: Scene) -> str:
 
 
 def _shape_data(shape: pin.GeometryObject) -> dict[str, Any]:
-    """A shape as the hull of points, widened by a radius or by discs; the ground has no points.
+    """A shape as the hull of points, widened by a radius or discs; the ground has no points.
 
-    In the frame of its joint [m].
+    In its joint's frame [m].
     """
     if isinstance(shape.geometry, coal.Halfspace):
         return {}

@@ -1,4 +1,4 @@
-"""Parts that are drawn: of arms, obstacles and the cube, their sizes, finishes and colours."""
+"""Drawn parts of arms, obstacles and the cube, with finishes and colours."""
 
 from typing import NamedTuple
 
@@ -14,18 +14,18 @@ FLOOR_RADIUS, GRID_RADIUS, GRID_STEP = 12.0, 2.0, 0.25
 """Of the floor, and of the lines on it [m]."""
 
 SLAB_THICKNESS = 0.02
-"""Thickness of the slab that covers an obstacle on which goals lie [m]."""
+"""Thickness of the slab on an obstacle that carries goals [m]."""
 
 TRACE_RADIUS = 0.0042
 TRACE_SIDES = 6
 FLASH_RADIUS = 0.025
-"""Radius of what lights up where two bodies touch [m]."""
+"""Radius of the flash at a contact [m]."""
 
 CUBE_CHAMFER = 0.08
 """Of the cube's edges, as a share of their length."""
 
 REFLECTANCE = 0.7
-"""Of white lacquer; a white that reflected everything would show no shape in bright light."""
+"""Of white lacquer; a white of 1 shows no shape in bright light."""
 
 
 class Finish(NamedTuple):
@@ -42,7 +42,7 @@ class Finish(NamedTuple):
 
 
 class ArmPart(NamedTuple):
-    """A piece of an arm in the frame of the joint that carries it; 0 is the base."""
+    """A piece of an arm in the frame of its joint; 0 is the base."""
 
     joint: int
     finish: Finish
@@ -58,7 +58,7 @@ FINISHES = {
 """Finishes of arms."""
 
 PLAIN = FINISHES["graphite"], FINISHES["paint"]
-"""Finishes of links by turns, where a robot states no colours."""
+"""Finishes of links by turns, for robots without colours."""
 
 OUTCOME_COLOURS = {"success": 0x0072B2, "collision": 0xD55E00, "truncated": 0xE69F00}
 """Distinguishable with any colour vision (Okabe and Ito)."""
@@ -67,11 +67,11 @@ TRACES: dict[str | None, Finish] = {
     None: Finish(0x4D5A68, roughness=0.5),
     **{outcome: Finish(colour, roughness=0.5) for outcome, colour in OUTCOME_COLOURS.items()},
 }
-"""Finish of the tool's way, by outcome; None while the episode goes on."""
+"""Finish of the tool's way by outcome; None before the end."""
 
 
 def shape_finish(colour: int) -> Finish:
-    """Surface of a visual shape of a URDF: lacquer or plastic, in a colour as 0xRRGGBB."""
+    """Lacquer or plastic of a visual shape of a URDF, in a colour 0xRRGGBB."""
     seen = to_srgb(REFLECTANCE * to_linear(channels(colour)))
     return Finish(packed_colour(seen), roughness=0.45, metalness=0.1)
 
@@ -90,21 +90,19 @@ def channels(colour: int) -> Array:
 def to_linear(encoded: ArrayLike) -> Array:
     """Decode sRGB."""
     value = np.asarray(encoded, dtype=float)
-    linear: Array = np.where(value <= 0.04045, value / 12.92, ((value + 0.055) / 1.055) ** 2.4)
-    return linear
+    return np.where(value <= 0.04045, value / 12.92, ((value + 0.055) / 1.055) ** 2.4)
 
 
 def to_srgb(linear: ArrayLike) -> Array:
     """Encode as sRGB."""
     value = np.asarray(linear, dtype=float)
-    encoded: Array = np.where(
+    return np.where(
         value <= 0.0031308, 12.92 * value, 1.055 * np.maximum(value, 0) ** (1 / 2.4) - 0.055
     )
-    return encoded
 
 
 def obstacle_meshes(obstacle: Obstacle, scene: Scene) -> list[Mesh]:
-    """An obstacle in the world; if goals lie on it, a bench: a body, and a slab on its top."""
+    """An obstacle; a bench of body and slab if goals lie on it."""
     size, centre = obstacle.size, obstacle.centre
     if any(_lies_on(region, obstacle, scene.cube_edge) for region in scene.goal_regions):
         top = min(SLAB_THICKNESS, size[2] / 2)
@@ -118,7 +116,7 @@ def obstacle_meshes(obstacle: Obstacle, scene: Scene) -> list[Mesh]:
 
 
 def _lies_on(region: GoalRegion, obstacle: Obstacle, edge: float) -> bool:
-    """Whether cubes with a given edge [m], centred in a region, lie on an obstacle."""
+    """Whether cubes of an edge [m], centred in a region, lie on an obstacle."""
     gap = region.lower[2] - obstacle.upper[2]
     half = np.abs(obstacle.rotation) @ obstacle.size / 2
     lower, upper = obstacle.centre - half, obstacle.centre + half

@@ -1,4 +1,4 @@
-"""Pictures of an arm at work, drawn in software: no display, graphics card or OpenGL is needed."""
+"""Pictures of an arm at work, in software: no display or OpenGL."""
 
 from collections.abc import Iterable
 
@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 from kinarm.arm import Arm
 from kinarm.collision import Contact
 from kinarm.errors import UnknownNameError, finite_array, whole_number
+from kinarm.kernels.compiling import Array
 from kinarm.problem import ProblemLike, ReachProblem
 from kinarm.recording import OUTCOMES
 from kinarm.viewer.camera import Camera, CameraLike, stage_scale
@@ -29,44 +30,41 @@ from kinarm.viewer.parts import (
 )
 from kinarm.viewer.visual_shapes import arm_parts, link_joints
 
-Array = NDArray[np.float64]
-
 SAMPLES = np.array([(0.375, 0.125), (0.875, 0.375), (0.125, 0.625), (0.625, 0.875)])
-"""Places in a pixel: no two in a row or column, so that edges of any slope are smooth."""
+"""Places in a pixel, no two in a row or column, for edges of any slope."""
 
 GRID_WIDTH = 1 / 600
-"""Width of the lines on the floor, as a share of the picture's height."""
+"""Width of the floor's lines, as a share of the picture's height."""
 
 FADING = (0.2, 3.8)
-"""The floor fades out between these distances, plus that of the camera from the origin [m]."""
+"""The floor fades between these, plus the camera's distance from the origin [m]."""
 
 SHADOW_DETAIL, SHADOW_SIZES = 2, (256, 2048)
-"""Texels along the shadow map for each pixel along the picture, and how many there may be."""
+"""Texels of the shadow map per pixel, and least and most of them."""
 HALO_OPACITY = 0.16
 FLASH_OPACITY, FLASH_SWELL = 0.55, 1.5
 
-# Finishes under the light of the replay page; the first is the floor's.
+# Finishes in the replay page's light; the first is the floor's.
 GROUND = Finish(0xD3D9DF, roughness=0.95)
 BODY = Finish(0x8F9AA8, roughness=0.8)
 SLAB = Finish(0xB3BDC8, roughness=0.7)
 CUBE = Finish(0x009E73, roughness=0.5)
 
 CUBE_GLOW, TOUCH_GLOW = 0x0B6B50, 0x8C2F00
-"""Light that the cube emits when it is reached, and links that touch something."""
+"""Light of a reached cube, and of links that touch."""
 
 
 class Renderer:
-    """Takes pictures of a problem, its arm and the way of the tool.
+    """Takes pictures of a problem, its arm and the tool's way.
 
     Light, colours and camera are those of the replay page.
 
     Parameters
     ----------
     problem, width, height
-        The problem, with its arm and scene; and the size of the pictures [pixels].
+        The problem, and the size of pictures [pixels].
     camera : Camera, optional
-        Where they are taken from; as the replay page does by default. A mapping of its attributes
-        or a sequence of their values will do.
+        The camera, or its values; as on the replay page by default.
 
     Raises
     ------
@@ -120,14 +118,13 @@ class Renderer:
         Parameters
         ----------
         configuration, goal : array_like, shapes (n_joints,) and (3,)
-            Joint positions [rad or m], and centre of the cube [m].
+            Joint positions [rad or m], and the cube's centre [m].
         trace : array_like, shape (n, 3), optional
             Where the tool has been [m].
         outcome : {"success", "collision", "truncated"}, optional
-            How the episode ended, if it has: gives the trace its colour, and lights up the cube
-            on success.
+            How the episode ended, if it has; colours trace and cube.
         contact : Contact, optional
-            What would have touched where; the bodies light up.
+            What would have touched; the bodies light up.
 
         Returns
         -------
@@ -166,7 +163,7 @@ class Renderer:
         return picture
 
     def _balls(self, goal: Array, contact: Contact | None) -> Array:
-        """The halo within which the goal counts as reached, and a flash at a contact."""
+        """Halo of goals within tolerance, and a flash at a contact."""
         halo = self.problem.task.tolerance, *channels(CUBE.colour), HALO_OPACITY, 0.0
         balls = [(*goal, *halo)]
         if contact is not None:
@@ -177,14 +174,14 @@ class Renderer:
 
 
 class TriangleScene:
-    """Surfaces of a problem and its arm, which are moved to where they are at a moment.
+    """Surfaces of a problem and its arm, placed for each picture.
 
     Attributes
     ----------
     n_joints, scale
-        Length of a configuration, and size of the stage; see `stage_scale`.
+        Length of a configuration, and size of the stage (`stage_scale`).
     finishes : list of Finish
-        Finishes of the surfaces, by material; the floor comes first.
+        Finishes by material; the floor's comes first.
     """
 
     def __init__(self, problem: ReachProblem, arm: Arm) -> None:
@@ -198,7 +195,7 @@ class TriangleScene:
         ]
         parts = [*standing, *arm_parts(arm), (arm.n_joints + 1, CUBE, cube_mesh(scene))]
         self._arm_owners = {part[:2] for part in arm_parts(arm)}
-        # Each frame has materials of its own, so that a link can light up.
+        # Each frame has its own materials, so that a link can light up.
         owners = [(0, GROUND), *((0, finish) for finish in TRACES.values())]
         self._owners = list(dict.fromkeys([*owners, *(part[:2] for part in parts)]))
         self.finishes = [finish for _, finish in self._owners]
@@ -211,7 +208,7 @@ class TriangleScene:
     def surfaces(
         self, configuration: Array, goal: Array, trace: Array, outcome: str | None
     ) -> Surfaces:
-        """All triangles in the world at a moment.
+        """All triangles in the world.
 
         Parameters
         ----------
@@ -233,7 +230,7 @@ class TriangleScene:
         return Surfaces(places, normals, np.empty_like(places), faces, materials)
 
     def emission(self, outcome: str | None, touching: Iterable[str]) -> Array:
-        """Light of each material, shape (n, 3): a cube that is reached glows, and what touches."""
+        """Light of each material, shape (n, 3): of a reached cube and of contact."""
         joints = {self._links[body] for body in touching if body in self._links}
         light = np.zeros((len(self._owners), 3))
         for material, (frame, finish) in enumerate(self._owners):
@@ -244,7 +241,7 @@ class TriangleScene:
         return light
 
     def _poses(self, configuration: Array, goal: Array) -> Array:
-        """Frames in the world, shape (n_joints + 2, 3, 4): the world, the joints, the goal."""
+        """Frames in the world, shape (n_joints + 2, 3, 4): world, joints, goal."""
         pin.forwardKinematics(self._arm.model, self._data, configuration)
         poses = np.zeros((self.n_joints + 2, 3, 4))
         poses[0, :, :3] = poses[-1, :, :3] = np.eye(3)

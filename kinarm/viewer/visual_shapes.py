@@ -35,30 +35,30 @@ SIZES = {
     "cylinder": (("radius", "length"), coal.Cylinder),
     "capsule": (("radius", "length"), coal.Capsule),
 }
-"""Attributes that state the sizes of visual shapes, and what they make."""
+"""Attributes with sizes of visual shapes, and the shapes."""
 
 SHAPES = {shape.__name__: shape for shape in (box, capsule, cylinder, housing, lathe, plate)}
-"""What the parts of ``industrial_arm.toml`` are."""
+"""Shapes of parts in ``industrial_arm.toml``."""
 
 AXES = np.array([(0, 0, 1), (0, 1, 0), (0, -1, 0), (-1, 0, 0), (0, -1, 0), (-1, 0, 0)])
-"""Of the joints of an arm that looks like that."""
+"""Axes of the joints of an arm that looks like that."""
 
 TOOL_RADIUS = 0.012
-"""Of the ball at the tool point; a share of the arm's reach if that is less than 1 m [m]."""
+"""Radius of the tool's ball; for a reach below 1 m, times the reach [m]."""
 
 TOLERANCE = 3e-4
-"""How far a simplified surface may lie from the planes of the triangles that it replaces [m]."""
+"""Distance of a simplified surface from the former triangles' planes [m]."""
 
 UNKNOWN = -1
-"""Stands for a colour that a file does not state."""
+"""A colour that a file does not state."""
 
 VERSION = 1
-"""Of what is kept of a file; to be raised when the same file makes other triangles."""
+"""To be raised when the same file makes other triangles."""
 
 logging.getLogger("trimesh").addHandler(logging.NullHandler())  # else it prints its warnings
 
 READERS = ("trimesh", "pycollada", "fast-simplification")
-"""Packages of the extra ``robots`` that meshes are read and simplified with."""
+"""Packages of the extra ``robots`` that read and simplify meshes."""
 
 UNIVERSAL_ROBOTS = np.array(
     [(0.49, 0.678, 0.8), (0.82, 0.82, 0.82), (0.279, 0.279, 0.279), (0.58, 0.58, 0.58), (0.1,) * 3]
@@ -66,12 +66,12 @@ UNIVERSAL_ROBOTS = np.array(
 """Colours of the maker's caps, links, joints, rims and seals."""
 
 DIMMING, MOST_TIMES, SAME_COLOUR = 0.8, 6, 0.003
-"""The meshes in ``ur_description`` went through a modeller a few times, each of which left them
-this share of their light; links that went through it more often than others look darker."""
+"""The meshes in ``ur_description`` went through a modeller, some more often than others, which each
+time left them this share of their light."""
 
 
 class PaintedMesh(NamedTuple):
-    """Triangles of one material, whose colour is 0xRRGGBB, or None if the file does not say."""
+    """Triangles of one material with its colour 0xRRGGBB, None if unstated."""
 
     mesh: Mesh
     colour: int | None
@@ -81,8 +81,8 @@ class PaintedMesh(NamedTuple):
 def arm_parts(arm: Arm) -> tuple[ArmPart, ...]:
     """All parts of an arm.
 
-    One with the geometry of the shipped ones looks like an industrial arm; any other shows the
-    visual shapes of its URDF, or its collision shapes where none can be read, which is logged.
+    It looks industrial with the geometry of the shipped ones. Any other arm shows the visual shapes
+    of its URDF, or its collision shapes where none can be read, which is logged.
     """
     if looks_industrial(arm):
         return tuple(industrial_parts(arm))
@@ -98,7 +98,7 @@ def arm_parts(arm: Arm) -> tuple[ArmPart, ...]:
 
 
 def looks_industrial(arm: Arm) -> bool:
-    """Whether an arm has the axes and offsets that ``industrial_arm.toml`` is made for."""
+    """Whether an arm has the axes and offsets of ``industrial_arm.toml``."""
     chain = arm.chain
     if chain.n_joints != 6 or chain.prismatic.any() or not np.allclose(chain.axis, AXES):
         return False
@@ -117,13 +117,13 @@ def looks_industrial(arm: Arm) -> bool:
 
 
 def industrial_parts(arm: Arm) -> Iterator[ArmPart]:
-    """Parts of ``industrial_arm.toml``, in the lengths of an arm that looks like that."""
+    """Parts of ``industrial_arm.toml``, in the lengths of an arm."""
     chain, base = arm.chain, arm.model.frames[1].placement  # of the link fixed in the world
     lengths = {"upper": chain.translation[2][2], "forearm": chain.translation[3][0]}
     lengths |= {"tool": chain.tool[0], "m": 1.0}
 
     def measured(value: Any) -> Any:
-        """Sum up lengths, wherever there are some in the sizes of a part."""
+        """Sum up lengths wherever they occur in the sizes of a part."""
         if isinstance(value, dict):
             return sum(share * lengths[name] for name, share in value.items())
         return [measured(each) for each in value] if isinstance(value, list) else value
@@ -149,13 +149,13 @@ def collision_parts(arm: Arm) -> tuple[ArmPart, ...]:
 
 
 def _placed_part(joint: int, colour: int | None, mesh: Mesh, placement: pin.SE3) -> ArmPart:
-    """A shape where it stands on a joint; without a colour, links have two by turns."""
+    """A shape on a joint; without colours, links alternate two."""
     finish = PLAIN[joint % len(PLAIN)] if colour is None else shape_finish(colour)
     return ArmPart(joint, finish, mesh.moved(placement.translation, placement.rotation))
 
 
 def link_joints(arm: Arm) -> dict[str, int]:
-    """Number of the joint that carries each link with a collision shape; 0 is the base."""
+    """Joint that carries each link with a collision shape; 0 is the base."""
     shapes = arm.geometry.geometryObjects
     return {name: shape.parentJoint for name, shape in zip(body_names(arm), shapes, strict=True)}
 
@@ -163,12 +163,12 @@ def link_joints(arm: Arm) -> dict[str, int]:
 def visual_parts(arm: Arm) -> Iterator[ArmPart]:
     """Visual shapes of an arm's URDF, simplified where they are meshes.
 
-    A mesh of several colours keeps them; else the URDF's colour goes before that of the mesh.
+    A mesh of several colours keeps them; else the URDF's colour takes precedence.
 
     Raises
     ------
     KinarmError
-        If a shape cannot be read, for want of the extra ``robots`` or because it is damaged.
+        If a shape is damaged or needs the missing extra ``robots``.
     """
     robot = ElementTree.fromstring(arm.description.text)
     named: dict[str | None, int] = {}
@@ -190,7 +190,7 @@ def visual_parts(arm: Arm) -> Iterator[ArmPart]:
 
 
 def _shapes(visual: Element, file: str) -> tuple[PaintedMesh, ...]:
-    """Shapes of a visual element of a file, in the element's frame."""
+    """Shapes of a visual element of a file, in its frame."""
     geometry, where = visual.find("geometry"), f"a visual shape of {file}"
     shape = None if geometry is None else next(iter(geometry), None)
     if shape is None:
@@ -219,17 +219,16 @@ def _stated_colour(material: Element) -> int | None:
 
 
 def _numbers(element: Element, name: str, where: str = "a visual shape") -> tuple[float, ...]:
-    """Numbers of an attribute, checked like those that decide about contact."""
+    """Checked numbers of an attribute."""
     check_numbers(element, where)
     return tuple(float(word) for word in element.get(name, "").split())
 
 
 def read_mesh_file(path: Path, scale: Sequence[float]) -> tuple[PaintedMesh, ...]:
-    """Read a mesh file and simplify it; or look up what came of it before.
+    """Read a mesh file and simplify it, or look it up in the cache.
 
-    Nodes are placed and units converted as the file says. Its up axis counts for nothing, as in
-    ROS and in Pinocchio, so that looks and collision shapes agree. ``scale`` are factors along the
-    axes.
+    Nodes are placed and units converted as the file says, without its up axis, as in ROS and
+    Pinocchio, so that looks and collision shapes agree. ``scale`` are factors along the axes.
 
     Raises
     ------
@@ -253,7 +252,7 @@ def read_mesh_file(path: Path, scale: Sequence[float]) -> tuple[PaintedMesh, ...
 
 @cache
 def _versions() -> list[str]:
-    """Versions of the packages that meshes are read and simplified with."""
+    """Versions of `READERS`."""
     try:
         return [metadata.version(name) for name in READERS]
     except metadata.PackageNotFoundError as error:
@@ -309,7 +308,7 @@ def _placed(geometry: Any, transform: NDArray[np.float64], scale: Sequence[float
 
 
 def _colour(geometry: Any, path: Path) -> int | None:
-    """Colour of a geometry as 0xRRGGBB; None if the file does not say."""
+    """Colour of a geometry as 0xRRGGBB, or None."""
     look = geometry.visual
     if look.kind is None:
         return None
@@ -318,7 +317,7 @@ def _colour(geometry: Any, path: Path) -> int | None:
 
 
 def original_colour(path: Path, colour: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Colour of a part as its maker made it, shape (3,), for one that a mesh file states."""
+    """The maker's colour, shape (3,), for one that a mesh file states."""
     if "ur_description" in path.parts:
         for times in range(MOST_TIMES + 1):
             apart = np.abs(UNIVERSAL_ROBOTS * DIMMING**times - colour).max(axis=1)
@@ -332,8 +331,8 @@ def _simplified(mesh: Mesh) -> Mesh:
     import fast_simplification
 
     welded = mesh.welded()
-    # Without loss means for this package that the squared distances of a corner from the planes
-    # that meet there sum up to less than this.
+    # To this package, lossless means that the squared distances of a corner from the planes that
+    # meet there sum up to less than this.
     unit = TOLERANCE / np.sqrt(np.finfo(float).eps)
     places, corners = welded.vertices / unit, welded.faces.astype(np.int32)
     simplify = fast_simplification.simplify

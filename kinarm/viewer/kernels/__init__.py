@@ -1,1 +1,1 @@
-"""Compiled kernels of the renderer: triangles to samples, samples to light and pixels."""
+"""Compiled kernels of the renderer: triangles to samples, light and pixels."""

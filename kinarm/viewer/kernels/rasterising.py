@@ -1,6 +1,6 @@
-"""Triangles to the samples of a picture and to the texels of a shadow.
+"""Triangles to samples of a picture and to texels of a shadow.
 
-Lengths are in metres, and shapes of arrays in brackets.
+Lengths are in metres, shapes of arrays in brackets.
 """
 
 import math
@@ -12,19 +12,19 @@ from numpy.typing import NDArray
 from kinarm.kernels.compiling import Array, Vector, inlined, kernel
 
 NEAR = 0.01
-"""Distance from the camera below which corners do not bound a triangle's picture [m]."""
+"""Distance from the camera below which corners do not bound a triangle [m]."""
 
 WIDE = 6
-"""Columns from which on it is worth while to find those of a row that a triangle reaches."""
+"""Columns from which a row's reached ones are worth finding."""
 
 
 class Eye(NamedTuple):
     """From where a picture is seen.
 
     position (3,): place of the camera in the world.
-    rays (3, 3): line of sight of the picture's upper left corner, as long as it gets ahead by 1,
-    and what is added to it per column and per row.
-    offsets (n_samples, 2): where in a pixel its samples lie, from its upper left corner.
+    rays (3, 3): line of sight of the picture's upper left corner, per distance ahead, and what is
+    added per column and per row.
+    offsets (n_samples, 2): samples in a pixel, from its upper left corner.
     fog (2,): distances at which fading into the background begins and ends.
     """
 
@@ -38,10 +38,10 @@ class Surfaces(NamedTuple):
     """Triangles.
 
     places, normals (n_vertices, 3): in the world.
-    corners (n_vertices, 3): vertices as the camera sees them, which are column and row of the
-    picture times the distance along the line of sight, and that distance.
+    corners (n_vertices, 3): column and row of each vertex in the picture, times the distance along
+    the line of sight, and that distance.
     faces (n_faces, 3): vertices of each triangle.
-    materials (n_vertices,): row of what each vertex is made of.
+    materials (n_vertices,): material of each vertex.
     """
 
     places: Array
@@ -53,7 +53,7 @@ class Surfaces(NamedTuple):
 
 @inlined
 def edge(a: Vector, b: Vector) -> Vector:
-    """Coefficients of x, y and 1 of a function that is zero on the line through two corners."""
+    """Coefficients of x, y and 1 that are zero on a line through two corners."""
     ax, ay, aw = a
     bx, by, bw = b
     return ay * bw - by * aw, aw * bx - bw * ax, ax * by - bx * ay
@@ -61,7 +61,7 @@ def edge(a: Vector, b: Vector) -> Vector:
 
 @inlined
 def _within(a: float, b: float, c: float, row: int, first: int, last: int) -> tuple[int, int]:
-    """Columns from first to last in whose pixels of a row a x + b y + c may be 0 or more."""
+    """Columns from first to last of a row where a x + b y + c may be 0 or more."""
     most = b * (row + (1 if b > 0.0 else 0)) + c
     if a > 0.0:
         return max(first, math.floor(min(-most / a, last + 1.0)) - 1), last
@@ -72,16 +72,16 @@ def _within(a: float, b: float, c: float, row: int, first: int, last: int) -> tu
 
 @kernel
 def transform(points: Array, frames: NDArray[np.int64], transforms: Array, result: Array) -> None:
-    """Apply to each point the transform of its frame.
+    """Transform each point by its frame.
 
     Parameters
     ----------
     points, result : ndarray, shape (n, 3)
-        Points, and where they go; ``result`` is filled in.
+        Points, and where they go.
     frames : ndarray of int, shape (n,)
         Frame of each point.
     transforms : ndarray, shape (n_frames, 3, 4)
-        For columns of x, y, z and 1.
+        Transforms of x, y, z and 1.
     """
     for i in range(points.shape[0]):
         frame = frames[i]
@@ -101,15 +101,15 @@ def draw_view(
 ) -> None:
     """Find the nearest front of a triangle at every sample.
 
-    Barycentric coordinates over the distance are linear in the picture (Olano and Greer, 1997),
-    so triangles that reach behind the camera need no clipping.
+    Barycentric coordinates over the distance are linear in the picture (Olano and Greer, 1997), so
+    triangles behind the camera need no clipping.
 
     Parameters
     ----------
     corners, faces, offsets
         As in `Surfaces` and `Eye`.
     nearness, index : ndarray, shape (height, width, n_samples)
-        As ``nearness`` and ``seen`` in `View`; changed in place.
+        ``nearness`` and ``seen`` of `View`; changed in place.
     """
     height, width, n_samples = index.shape
     for face in range(faces.shape[0]):
@@ -117,12 +117,12 @@ def draw_view(
         xi, yi, wi = corners[i, 0], corners[i, 1], corners[i, 2]
         xj, yj, wj = corners[j, 0], corners[j, 1], corners[j, 2]
         xk, yk, wk = corners[k, 0], corners[k, 1], corners[k, 2]
-        # Six times the volume between the camera and the triangle; positive ones face away.
+        # Six times the volume between camera and triangle; positive ones face away.
         ai, bi, ci = edge((xj, yj, wj), (xk, yk, wk))
         volume = ai * xi + bi * yi + ci * wi
         if volume >= 0.0 or max(wi, wj, wk) < NEAR:
             continue
-        # Pixels around the three corners; all of them if one is behind the camera.
+        # Pixels around the corners; all if one is behind the camera.
         left, right, top, bottom = 0, width - 1, 0, height - 1
         if min(wi, wj, wk) >= NEAR:
             ui, uj, uk, vi, vj, vk = xi / wi, xj / wj, xk / wk, yi / wi, yj / wj, yk / wk
@@ -130,14 +130,14 @@ def draw_view(
             right = min(right, math.floor(min(max(ui, uj, uk), width + 0.0)))
             top = max(top, math.floor(max(min(vi, vj, vk), -1.0)))
             bottom = min(bottom, math.floor(min(max(vi, vj, vk), height + 0.0)))
-        # Barycentric coordinates over the distance, as functions of column and row.
+        # Barycentric coordinates over the distance, by column and row.
         aj, bj, cj = edge((xk, yk, wk), (xi, yi, wi))
         ak, bk, ck = edge((xi, yi, wi), (xj, yj, wj))
         scale = 1.0 / volume
         ai, bi, ci = ai * scale, bi * scale, ci * scale
         aj, bj, cj = aj * scale, bj * scale, cj * scale
         ak, bk, ck = ak * scale, bk * scale, ck * scale
-        # Samples inside of all three edges, if nothing nearer is seen there.
+        # Samples within all edges, if nothing nearer is seen there.
         for row in range(top, bottom + 1):
             first, last = left, right
             if last - first > WIDE:
@@ -159,16 +159,16 @@ def draw_view(
 
 @kernel
 def draw_shadow(shadowed: Array, faces: NDArray[np.int64], depth: NDArray[np.float32]) -> None:
-    """Keep how near the sun the nearest back of a triangle is, at the middle of every texel.
+    """Keep how near the sun the nearest back of a triangle is in every texel's middle.
 
-    Backs instead of fronts keep what the sun shines on from shadowing itself.
+    Backs, unlike fronts, do not let lit surfaces shadow themselves.
 
     Parameters
     ----------
     shadowed : ndarray, shape (n_vertices, 3)
-        Vertices as the sun sees them: column and row of the shadow map, and how near the sun [m].
+        Vertices for the sun: column and row of the shadow map, and how near the sun [m].
     faces, depth
-        As ``faces`` in `Surfaces` and ``shadow`` in `Lights`; the latter is changed in place.
+        ``faces`` of `Surfaces` and ``shadow`` of `Lights`, which is changed in place.
     """
     height, width = depth.shape
     for face in range(faces.shape[0]):

@@ -1,4 +1,4 @@
-"""Samples to pixels: which surface is seen, how it is lit, and what lies over it."""
+"""Samples to pixels: seen surfaces, their light, and what covers them."""
 
 import math
 from typing import NamedTuple
@@ -15,20 +15,20 @@ FLOOR = 0
 """Material of the floor."""
 
 BACKGROUND, GRID = (tuple(channels(colour).tolist()) for colour in (0xEEF1F4, 0xB4BDC7))
-"""Colours, in sRGB, into which all fades, and of the lines on the floor."""
+"""Colours, in sRGB, of the background and of the floor's lines."""
 
 GAMMA = to_srgb(np.linspace(0, 1, 4096))
-"""Encoding of linear values from 0 to 1."""
+"""Encoded linear values from 0 to 1."""
 
 
 class View(NamedTuple):
-    """All that a picture shows, for its pixels to be coloured.
+    """All that a picture shows.
 
-    balls (n, 9): glowing balls: centre, radius, colour in sRGB, opacity, and whether it is seen
-    through everything (1).
+    balls (n, 9): glowing balls: centre, radius, colour in sRGB, opacity, and whether everything
+    lets it through (1).
     floor (height, width, 2, 3): colours of floor and background, in shadow and in the sun.
     nearness (height, width, n_samples): one over the distance ahead of what is seen [1/m].
-    seen (height, width, n_samples): triangle that is seen there; negative for the floor.
+    seen (height, width, n_samples): triangle that is seen; negative for the floor.
     """
 
     eye: Eye
@@ -61,7 +61,7 @@ def _line_of_sight(eye: Eye, x: float, y: float) -> Vector:
 
 @inlined
 def _shares(surfaces: Surfaces, face: int, x: float, y: float) -> Vector:
-    """Barycentric coordinates of the place of a triangle that is seen at a place of the picture."""
+    """Barycentric coordinates, in a triangle, of a place of the picture."""
     corners, faces = surfaces.corners, surfaces.faces
     i, j, k = faces[face, 0], faces[face, 1], faces[face, 2]
     at_i = corners[i, 0], corners[i, 1], corners[i, 2]
@@ -79,7 +79,7 @@ def _shares(surfaces: Surfaces, face: int, x: float, y: float) -> Vector:
 
 @inlined
 def _mixed(table: Array, corners: tuple[int, int, int], share: Vector) -> Vector:
-    """Row of a table between three rows."""
+    """Mixture of three rows of a table."""
     i, j, k = corners
     a, b, c = share
     return (
@@ -91,7 +91,7 @@ def _mixed(table: Array, corners: tuple[int, int, int], share: Vector) -> Vector
 
 @inlined
 def _line_cover(across: float, slope: float, width: float) -> float:
-    """Share of a pixel that the nearest of lines covers; ``slope`` is a pixel's size [m]."""
+    """Share of a pixel, of a size ``slope`` [m], that the nearest line covers."""
     line = GRID_STEP * math.floor(across / GRID_STEP + 0.5)
     if abs(line) >= GRID_RADIUS:
         return 0.0
@@ -100,7 +100,7 @@ def _line_cover(across: float, slope: float, width: float) -> float:
 
 @inlined
 def _grid_cover(eye: Eye, line_width: float, x: float, y: float, ahead: float) -> float:
-    """Share of a pixel that is covered by lines, where the floor is seen there."""
+    """Share of a pixel on the floor that lines cover."""
     rays = eye.rays
     dx, dy, dz = _line_of_sight(eye, x, y)
     px, py = eye.position[0] + ahead * dx, eye.position[1] + ahead * dy
@@ -117,7 +117,7 @@ def _grid_cover(eye: Eye, line_width: float, x: float, y: float, ahead: float) -
 
 @inlined
 def _faded(eye: Eye, ahead: float) -> float:
-    """How much of a surface at a distance is lost in the background."""
+    """How far a surface at a distance has faded into the background."""
     share = (ahead - eye.fog[0]) / (eye.fog[1] - eye.fog[0])
     share = min(max(share, 0.0), 1.0)
     fog: float = share * share * (3.0 - 2.0 * share)
@@ -136,7 +136,7 @@ def _towards(colour: Vector, other: Vector, share: float) -> Vector:
 
 @inlined
 def _finished(light: Vector, lines: float, fog: float) -> Vector:
-    """Encode light, with lines over it, in the fog."""
+    """Encode light, add lines, and fade it."""
     encoded = _encoded(light[0]), _encoded(light[1]), _encoded(light[2])
     red, green, blue = _towards(encoded, GRID, lines)
     return (
@@ -148,7 +148,7 @@ def _finished(light: Vector, lines: float, fog: float) -> Vector:
 
 @inlined
 def _surface_colour(view: View, face: int, x: float, y: float) -> Vector:
-    """Colour of a triangle that is seen at a place of the picture."""
+    """Colour of a triangle at a place of the picture."""
     surfaces = view.surfaces
     dx, dy, dz = _line_of_sight(view.eye, x, y)
     corners = surfaces.faces[face, 0], surfaces.faces[face, 1], surfaces.faces[face, 2]
@@ -164,7 +164,7 @@ def _surface_colour(view: View, face: int, x: float, y: float) -> Vector:
 
 @inlined
 def _floor_distance(eye: Eye, x: float, y: float) -> float:
-    """Distance ahead of the floor that is seen at a place of the picture; 0 if none is."""
+    """Distance ahead of the floor at a place of the picture; 0 if unseen."""
     dx, dy, dz = _line_of_sight(eye, x, y)
     if dz >= 0.0 or eye.position[2] <= 0.0:
         return 0.0
@@ -183,16 +183,16 @@ def paint_floor(
     floor: NDArray[np.float32],
     nearness: NDArray[np.float32],
 ) -> None:
-    """Colour the floor, in shadow and in the sun, and find how near it is.
+    """Colour the floor, in shadow and in the sun, and find its nearness.
 
     Parameters
     ----------
     eye, materials, lights
         Parts of a `View`.
     line_width : float
-        Of a line on the floor [pixels].
+        Width of a line on the floor [pixels].
     floor, nearness
-        Parts of a `View`, which are filled in where the floor is seen.
+        Parts of a `View`, filled in where the floor is seen.
     """
     for row in range(floor.shape[0]):
         for column in range(floor.shape[1]):
@@ -258,7 +258,7 @@ def _ball_cover(view: View, ball: int, row: int, column: int) -> float:
 def shade(view: View, picture: NDArray[np.uint8]) -> None:
     """Colour all pixels.
 
-    What is seen at several samples of a pixel is lit once, in their middle.
+    What several samples of a pixel see is lit once, in their middle.
     """
     index, balls, offsets = view.seen, view.balls, view.eye.offsets
     height, width, n_samples = index.shape
