@@ -22,9 +22,9 @@ from kinarm.evaluation.outcomes import Holding
 from kinarm.evaluation.trials import TrialSet, trial_generator
 from kinarm.networks import Networks
 from kinarm.observation import observation_size
-from kinarm.policies.conversion.sb3 import find_vec_normalize
-from kinarm.policies.library import policy_files
+from kinarm.policies.library import models_in, policy_files
 from kinarm.policies.policy import Policy
+from kinarm.policies.provenance import normalization_note
 from kinarm.problem import ProblemLike, ReachProblem
 from kinarm.simulator import PolicyFunction
 
@@ -73,8 +73,7 @@ class Contestant:
     @property
     def note(self) -> str:
         """A remark in one line, such as the statistics in use; empty if there is none."""
-        statistics = self.policy and self.policy.provenance.config.get("vec_normalize")
-        return f"{self.name}: observations normalised by {statistics}" if statistics else ""
+        return normalization_note(self.name, self.policy.provenance.config) if self.policy else ""
 
     @property
     def problem(self) -> ReachProblem | None:
@@ -190,7 +189,9 @@ def measure_holding(contestant: Contestant, trials: TrialSet) -> Holding:
 
 
 def find_contestants(
-    name_or_file: str | Path, problem: ProblemLike | None = None
+    name_or_file: str | Path,
+    problem: ProblemLike | None = None,
+    vec_normalize: str | Path | None = None,
 ) -> tuple[Contestant, ...]:
     """Find what a name stands for.
 
@@ -198,17 +199,20 @@ def find_contestants(
     ----------
     name_or_file : str or Path
         A baseline, ``"oracle"``, a shipped policy, a group of them (all training seeds),
-        ``"best"``, a policy file, a folder of them, a model of Stable-Baselines3 (.zip) or
+        ``"best"``, a policy file, a model of Stable-Baselines3 (.zip), a folder of either, or
         ``"module:function"``. A model and a module run code: open only those that you trust.
     problem : ReachProblem, str or Path, optional
         What a model is for, as its file does not say, or the best shipped policy; others say it
         themselves.
+    vec_normalize : str or Path, optional
+        Statistics of a model's observations; see `Policy.from_sb3`.
     """
     text = str(name_or_file)
     if text in UNTRAINED:
         return (UNTRAINED[text],)
-    if text.endswith(".zip"):
-        return (_model_contestant(Path(text), problem),)
+    models = [Path(text)] if text.endswith(".zip") else models_in(Path(text))
+    if models:
+        return tuple(_model_contestant(path, problem, vec_normalize) for path in models)
     if is_import_path(text):
         return (_imported_contestant(text),)
     try:
@@ -239,10 +243,12 @@ def contestant_of(
     return Contestant.from_function(name, policy_function(policy, name))
 
 
-def _model_contestant(path: Path, problem: ProblemLike | None) -> Contestant:
-    """A model of Stable-Baselines3, with the statistics that lie beside it."""
+def _model_contestant(
+    path: Path, problem: ProblemLike | None, vec_normalize: str | Path | None
+) -> Contestant:
+    """A model of Stable-Baselines3."""
     try:
-        policy = Policy.from_sb3(path, problem, find_vec_normalize(path))
+        policy = Policy.from_sb3(path, problem, vec_normalize)
     except InvalidInputError as error:
         raise InvalidInputError(f"{str(path)!r}: {error}") from error
     return Contestant.from_policy(path.stem, policy, path.resolve())

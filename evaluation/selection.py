@@ -88,7 +88,8 @@ def _named_contestants(request: "EvaluationRequest", named: list[ReachProblem]) 
     found: dict[tuple[str, Path | None], Contestant] = {}
     for name in request.policies:
         if name != BEST:
-            found |= {(each.name, each.source): each for each in find_contestants(name, only)}
+            chosen = find_contestants(name, only, request.vec_normalize)
+            found |= {(each.name, each.source): each for each in chosen}
             continue
         for problem in named or [_changed(request, each) for each in PROBLEMS.values()]:
             (best,) = find_contestants(BEST, problem)

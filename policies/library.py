@@ -2,7 +2,7 @@
 
 import json
 import re
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from importlib import resources
 from pathlib import Path
 
@@ -102,14 +102,24 @@ def policy_files(name_or_file: str | Path, problem: ProblemLike | None = None) -
     raise UnknownNameError("policy", text, (BEST, *groups, "path/to/policy.npz", "folder/"))
 
 
+def models_in(path: Path) -> list[Path]:
+    """Models of Stable-Baselines3 (.zip) in a folder without policies, in the same order."""
+    if not is_folder(path) or any(path.glob("*.npz")):
+        return []
+    return _in_order(path.glob("*.zip"))
+
+
 def _files_in(folder: Path) -> tuple[Path, ...]:
     """Policies in a folder, but not the checkpoints of trainings."""
     found = [path for path in folder.glob("*.npz") if not path.name.endswith(CHECKPOINT)]
     if not found:
         raise InvalidInputError(f"there is no policy (.npz) in the folder {str(folder)!r}")
-    return tuple(
-        sorted(found, key=lambda path: re.sub(r"\d+", lambda n: n[0].rjust(20, "0"), path.name))
-    )
+    return tuple(_in_order(found))
+
+
+def _in_order(paths: Iterable[Path]) -> list[Path]:
+    """Paths in the order of the numbers in their names."""
+    return sorted(paths, key=lambda path: re.sub(r"\d+", lambda n: n[0].rjust(20, "0"), path.name))
 
 
 def starting_policy(name_or_file: str, widths: Sequence[int]) -> Policy:

@@ -176,8 +176,9 @@ class Policy:
         problem : ReachProblem, str or Path, optional
             The problem that the policy is for; by default that of the model's environment.
         vec_normalize : VecNormalize, str or Path, optional
-            The statistics that normalise its observations, or their file; by default those of the
-            model's environment.
+            The statistics that normalise its observations, their file, which runs code, or
+            ``"none"``. By default those of the model's environment, and for a file those that bear
+            its name; a model that was trained with others is refused.
 
         Raises
         ------

@@ -22,7 +22,6 @@ from kinarm.evaluation.replay.runs import record
 from kinarm.evaluation.trials import TrialSet
 from kinarm.policies.library import BEST, group_of, policy_names
 from kinarm.problem import ReachProblem
-from kinarm.problem_options import ProblemOptions
 from kinarm.recording import Recording, load_recordings
 
 if TYPE_CHECKING:
@@ -145,7 +144,7 @@ def _find_candidates(request: "ReplayRequest") -> Candidates:
     if request.source is None:
         return _fresh_candidates(request, names)
     if request.source.suffix == ".json":
-        return _evaluated_candidates(request.source, names, request.problem)
+        return _evaluated_candidates(request.source, request, names)
     return _recorded_candidates(request.source, names, request.problem, request.arm)
 
 
@@ -161,42 +160,44 @@ def _fresh_candidates(request: "ReplayRequest", names: Sequence[str | None]) -> 
 
 
 def named_contestants(
-    options: ProblemOptions, names: Sequence[str | None]
+    request: "ReplayRequest", names: Sequence[str | None]
 ) -> tuple[list[Contestant], ReachProblem]:
     """The contestants of names, and the problem that they face.
 
-    That is the one that options name, for the best policy by default the usual one; or what they
+    That is the one that a request names, for the best policy by default the usual one; or what they
     make of that of the first trained contestant.
     """
-    named = options.problem is not None or options.task is not None
-    stated = options.resolve() if named or BEST in names else None
-    contestants = [_first_contestant(name, stated) for name in names]
+    named = request.problem is not None or request.task is not None
+    stated = request.resolve() if named or BEST in names else None
+    contestants = [_first_contestant(name, stated, request.vec_normalize) for name in names]
     if stated is not None:
         return contestants, stated
     trained = [contestant.problem for contestant in contestants if contestant.problem is not None]
     if not trained:
         raise InvalidInputError(f"{contestants[0].name!r} was not trained: name a --problem")
-    return contestants, options.resolve(trained[0])
+    return contestants, request.resolve(trained[0])
 
 
-def _first_contestant(name: str | None, problem: ReachProblem | None = None) -> Contestant:
+def _first_contestant(
+    name: str | None, problem: ReachProblem | None = None, vec_normalize: Path | None = None
+) -> Contestant:
     """The contestant of a name, of a group its first seed; for a problem, if it does not say."""
     if name is None:
         raise InvalidInputError("name a --policy, or a file of recordings or of an evaluation")
-    return find_contestants(name, problem)[0]
+    return find_contestants(name, problem, vec_normalize)[0]
 
 
 def _evaluated_candidates(
-    path: Path, names: Sequence[str | None], problem: str | None
+    path: Path, request: "ReplayRequest", names: Sequence[str | None]
 ) -> Candidates:
     """Run policies on the trials of an evaluation again."""
-    document = EvaluationDocument.load(path)
+    document, problem = EvaluationDocument.load(path), request.problem
     chosen = []
     for name in names:
         contestant = None
         if name is not None and (Path(name).suffix in (".npz", ".zip") or is_import_path(name)):
             faced = problem or next(iter(document.protocol.problems))
-            contestant = _first_contestant(name, document.problem(faced))
+            contestant = _first_contestant(name, document.problem(faced), request.vec_normalize)
         row = document.result(_name_in(document, contestant) if contestant else name, problem)
         problem = row.problem
         chosen.append((row, contestant or _known_contestant(row.policy, path)))

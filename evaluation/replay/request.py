@@ -44,6 +44,9 @@ class ReplayRequest(ProblemOptions):
         Shipped policy or recipe (its first seed), best, random, zero, oracle, .npz file, folder of
         them (the first), Stable-Baselines3's model.zip (runs its code: only if you trust it), or
         module:function.
+    vec_normalize : Path
+        Statistics of VecNormalize for a model of Stable-Baselines3 (runs code), or none; by default
+        those that bear its name.
     compare : tuple of str
         Two policies on the same trials, the second as a ghost.
     trial : tuple of int
@@ -85,6 +88,7 @@ class ReplayRequest(ProblemOptions):
     policy: str | None = field(
         default=None, metadata={"metavar": "NAME_OR_FILE", "completes": policy_choices}
     )
+    vec_normalize: Path | None = field(default=None, metadata={"metavar": "FILE|none"})
     compare: tuple[str, str] | None = field(default=None, metadata={"metavar": ("A", "B")})
     trial: tuple[int, ...] = field(default=(), metadata={"repeat": True, **FROM_ZERO})
     worst: int | None = None
@@ -102,7 +106,7 @@ class ReplayRequest(ProblemOptions):
     browser: bool = True
 
     GROUPS: ClassVar = {
-        "what is replayed": ("source", "policy", "compare", "allow_other_arm"),
+        "what is replayed": ("source", "policy", "vec_normalize", "compare", "allow_other_arm"),
         "which trials": (
             *("trials", "seed", "trial", "worst", "collisions", "failures", "oracle"),
         ),
@@ -176,6 +180,7 @@ class ReplayRequest(ProblemOptions):
 
     def _write(self, report: Callable[[str], object]) -> "ReplayPage":
         from kinarm.evaluation.replay.choosing import chosen_recordings
+        from kinarm.policies.provenance import normalization_note
         from kinarm.recording import save_recordings
         from kinarm.viewer import replay_page
 
@@ -192,8 +197,9 @@ class ReplayRequest(ProblemOptions):
         if self.record is not None:
             save_recordings(self.record, [recording for run in runs for recording in run])
         page.save(out)
-        for note in dict.fromkeys(normalization_note(run[0]) for run in runs):
-            if note:
+        for recording in (run[0] for run in runs):
+            policy = recording.provenance.get("policy") or {}
+            if note := normalization_note(recording.policy, policy.get("config", {})):
                 report(note)
         if groups:
             report(heading)
@@ -227,13 +233,6 @@ class ReplayRequest(ProblemOptions):
                 webbrowser.open(server.address)
             for recording in follow(server, simulator, recordings):
                 report(described(recording))
-
-
-def normalization_note(recording: "Recording") -> str:
-    """Which file normalised what a policy saw, in a line; empty if none did."""
-    policy = recording.provenance.get("policy") or {}
-    statistics = policy.get("config", {}).get("vec_normalize")
-    return f"{recording.policy}: observations normalised by {statistics}" if statistics else ""
 
 
 def described(recording: "Recording") -> str:

@@ -4,7 +4,6 @@ A model sees the observation, whole or in parts, normalised if it was trained so
 this normalisation lie apart from the model.
 """
 
-import pickle
 import warnings
 from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
@@ -26,6 +25,12 @@ from kinarm.policies.conversion.layers import (
     normalization,
     policy_of_pieces,
 )
+from kinarm.policies.conversion.statistics import (
+    NONE,
+    check_not_normalized,
+    find_vec_normalize,
+    load_vec_normalize,
+)
 from kinarm.problem import ProblemLike, ReachProblem
 from kinarm.simulator import Simulator
 
@@ -40,9 +45,6 @@ FAMILIES = ("TQCPolicy", "SACPolicy", "TD3Policy", "ActorCriticPolicy")
 
 NOT_SETTINGS = ("verbose", "seed", "num_timesteps", "start_time", "tensorboard_log", "device")
 """Attributes of a model that say nothing about how it was trained, or are kept elsewhere."""
-
-FILES = ("vecnormalize.pkl", "vec_normalize.pkl")
-"""Names that rl-zoo3 and the documentation of Stable-Baselines3 give to the statistics."""
 
 ROUNDING = 1e-5
 """How exactly the bounds of a space of float32 have to agree."""
@@ -78,8 +80,7 @@ def policy_from_sb3(
     given : BaseAlgorithm, str or Path
         The model, or its file.
     problem, vec_normalize
-        The problem that the policy is for, and the ``VecNormalize`` of its observations, or its
-        file; None stands for those of the model's environment.
+        As there.
 
     Raises
     ------
@@ -87,18 +88,14 @@ def policy_from_sb3(
         If it cannot be converted, or a file cannot be read.
     """
     model = sb3_model(given)
-    from stable_baselines3.common.vec_env import unwrap_vec_normalize
-
     own = ReachProblem.load(problem) if problem is not None else model.problem
     if own is None:
         raise InvalidInputError(
             "the model does not say which problem it is for: give it (problem=, --problem)"
         )
-    statistics = unwrap_vec_normalize(model.env)
-    if vec_normalize is not None:
-        statistics = load_vec_normalize(vec_normalize)
     simulator = Simulator(own, threads=1)
     interface, selection, sizes = model_inputs(model.policy, simulator)
+    statistics, origin = _statistics_of(model, given, vec_normalize, simulator.arm.n_joints)
     model.policy.set_training_mode(False)
     pieces = [selection, *normalization(statistics, sizes), *_actor_pieces(model.policy)]
     config = {
@@ -108,9 +105,8 @@ def policy_from_sb3(
         and not key.startswith("_")
         and key not in NOT_SETTINGS
     }
-    if statistics is not None:
-        is_file = isinstance(vec_normalize, str | Path)
-        config["vec_normalize"] = str(vec_normalize) if is_file else True
+    if origin is not None:
+        config["vec_normalize"] = origin
     policy = policy_of_pieces(
         kind,
         pieces,
@@ -123,6 +119,29 @@ def policy_from_sb3(
     )
     _check_same_actions(policy, model.policy, statistics, interface, simulator)
     return policy
+
+
+def _statistics_of(
+    model: SB3Model, given: Any, asked: Any, n_joints: int
+) -> tuple[Any, str | None]:
+    """The ``VecNormalize`` of a model's observations, or None, and where it is from to tell."""
+    from stable_baselines3.common.vec_env import unwrap_vec_normalize
+
+    if str(asked) == NONE:
+        return None, NONE
+    file = Path(given) if isinstance(given, str | Path) else None
+    if asked is None and file is not None:
+        asked = find_vec_normalize(file)
+    if asked is not None:
+        is_file = isinstance(asked, str | Path)
+        return load_vec_normalize(asked), str(asked) if is_file else "VecNormalize"
+    statistics = unwrap_vec_normalize(model.env)
+    if statistics is not None:
+        return statistics, "VecNormalize of its environment"
+    if file is None:
+        return None, None
+    check_not_normalized(model.attributes.get("_last_obs"), n_joints, file)
+    return None, NONE
 
 
 def _actor_pieces(policy: Any) -> Iterator[Piece]:
@@ -311,37 +330,3 @@ def _agree(first: Any, second: Any, but_for: Iterable[slice] = ()) -> bool:
     for part in but_for:  # goals lie elsewhere in other problems
         alike[:, part] = True
     return bool(alike.all())
-
-
-def find_vec_normalize(model: Path) -> Path | None:
-    """Find a model's statistics where Stable-Baselines3 and rl-zoo3 write them.
-
-    Beside ``folder/name.zip`` it is ``folder/vecnormalize.pkl``, ``folder/vec_normalize.pkl``,
-    for a checkpoint ``folder/prefix_vecnormalize_1000_steps.pkl``, and in rl-zoo3's folder
-    ``id_1`` it is ``id_1/id/vecnormalize.pkl``. Returns None if there are none.
-    """
-    folder, (prefix, _, number) = model.resolve().parent, model.stem[:-6].rpartition("_")
-    places = [folder / name for name in FILES]
-    places.append(folder / folder.name.rpartition("_")[0] / FILES[0])
-    if model.stem.endswith("_steps"):
-        places.insert(0, folder / f"{prefix}_vecnormalize_{number}_steps.pkl")
-    return next((place for place in places if place.is_file()), None)
-
-
-def load_vec_normalize(given: Any) -> Any:
-    """A ``VecNormalize``, or the file of one, which runs code: open only files that you trust.
-
-    Raises
-    ------
-    PolicyFileError
-        If a file cannot be read, or it is something else.
-    """
-    if isinstance(given, str | Path):
-        with (
-            reading(repr(str(given)), "VecNormalize", PolicyFileError, of="Stable-Baselines3"),
-            Path(given).open("rb") as f,
-        ):
-            given = pickle.load(f)
-    if not hasattr(given, "norm_obs") or not hasattr(given, "clip_obs"):
-        raise PolicyFileError(f"expected VecNormalize or its file, got {type(given).__name__}")
-    return given

@@ -30,9 +30,9 @@ def saved(here):
     env.reset()
     for _ in range(20):
         env.step(np.ones((1, 5)))
-    sb3.PPO("MlpPolicy", env, seed=1, device="cpu").save(here / "model.zip")
-    env.save(here / "vecnormalize.pkl")
-    return here / "model.zip"
+    sb3.PPO("MlpPolicy", env, seed=1, device="cpu").save(here / "model_20_steps.zip")
+    env.save(here / "model_vecnormalize_20_steps.pkl")
+    return here / "model_20_steps.zip"
 
 
 @pytest.fixture
@@ -51,11 +51,12 @@ class TestModel:
         assert answer.status == 0, answer.err
         assert "model" in answer.out
         assert "oracle" in answer.out
-        note = f"model: observations normalised by {saved.with_name('vecnormalize.pkl')}"
+        statistics = saved.with_name("model_vecnormalize_20_steps.pkl")
+        note = f"model_20_steps: observations normalised by {statistics}"
         assert note in "".join(answer.out.splitlines())
         rows = json.loads(run("kinarm-eval", *arguments, "--json").out)["results"]
         assert [(row["policy"], row["trained_on"]) for row in rows] == [
-            ("model", "right"),
+            ("model_20_steps", "right"),
             ("oracle", None),
         ]
         assert rows[0]["note"] == note
@@ -99,7 +100,7 @@ class TestCard:
         )
         assert answer.status == 0, answer.err
         beside = load_policy("share/mine.npz")
-        own = Policy.from_sb3(saved, "right", saved.with_name("vecnormalize.pkl"))
+        own = Policy.from_sb3(saved, "right", saved.with_name("model_vecnormalize_20_steps.pkl"))
         seen = np.random.default_rng(0).normal(size=(10, 48))
         np.testing.assert_array_equal(beside(seen), own(seen))
         assert "| algorithm | ppo |" in saved.with_name("share").joinpath("mine.md").read_text()

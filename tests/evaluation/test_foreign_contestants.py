@@ -94,7 +94,7 @@ class TestModule:
             find_contestants(f"{module}:{name}")
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture
 def model():
     sb3 = pytest.importorskip("stable_baselines3")
     from stable_baselines3.common.vec_env import DummyVecEnv, VecNormalize
@@ -103,7 +103,7 @@ def model():
     env.reset()
     for _ in range(30):
         env.step(np.ones((1, 5)))
-    return sb3.PPO("MlpPolicy", env, seed=1, device="cpu")
+    return sb3.PPO("MlpPolicy", env, seed=1, n_steps=64, device="cpu")
 
 
 class TestModel:
@@ -111,7 +111,8 @@ class TestModel:
         model.save(tmp_path / "model.zip")
         (contestant,) = find_contestants(tmp_path / "model.zip", "right")
         assert (contestant.name, contestant.algorithm, contestant.recipe) == ("model", "ppo", "sb3")
-        assert (contestant.seed, contestant.note) == (1, "")
+        note = "model: observations not normalised, without VecNormalize"
+        assert (contestant.seed, contestant.note) == (1, note)
         assert contestant.problem.digest == PROBLEMS["right"].digest
         evaluation = evaluate(tmp_path / "model.zip", "right", trials=10)
         expected = evaluate(Policy.from_sb3(tmp_path / "model.zip", "right"), trials=10)
@@ -120,13 +121,13 @@ class TestModel:
     @pytest.mark.parametrize(
         ("model_file", "statistics"),
         [
-            ("model.zip", "vecnormalize.pkl"),
-            ("best_model.zip", "vec_normalize.pkl"),
             ("rl_model_500_steps.zip", "rl_model_vecnormalize_500_steps.pkl"),
             ("kinarm-ReachRight-v0_1/model.zip", "kinarm-ReachRight-v0_1/kinarm-ReachRight-v0/"),
         ],
     )
-    def test_statistics_beside_it_are_used_and_told(self, model, tmp_path, model_file, statistics):
+    def test_statistics_that_bear_its_name_are_used_and_told(
+        self, model, tmp_path, model_file, statistics
+    ):
         path, beside = tmp_path / model_file, tmp_path / statistics
         if beside.suffix != ".pkl":
             beside = beside / "vecnormalize.pkl"
@@ -139,10 +140,36 @@ class TestModel:
         seen = np.random.default_rng(0).normal(size=(20, 48))
         np.testing.assert_array_equal(contestant.policy(seen), own(seen))
 
+    @pytest.mark.parametrize("learnt", [False, True])
+    def test_statistics_that_lie_beside_it_may_be_those_of_another(self, model, tmp_path, learnt):
+        """They are not even opened, and a model that needs some is refused."""
+        if learnt:
+            model.learn(1)
+        model.save(tmp_path / "best_model.zip")
+        beside = tmp_path / "vecnormalize.pkl"
+        beside.write_bytes(b"not to be opened")
+        if learnt:
+            with pytest.raises(InvalidInputError, match=f"--vec-normalize {beside}"):
+                find_contestants(tmp_path / "best_model.zip", "right")
+            with pytest.raises(InvalidInputError, match=f"--vec-normalize {beside}"):
+                Policy.from_sb3(tmp_path / "best_model.zip", "right")
+        model.get_vec_normalize_env().save(beside)
+        seen = np.random.default_rng(0).normal(size=(20, 48))
+        for given in ("none", beside):
+            (contestant,) = find_contestants(tmp_path / "best_model.zip", "right", given)
+            own = Policy.from_sb3(model, vec_normalize=given)
+            np.testing.assert_array_equal(contestant.policy(seen), own(seen))
+
+    def test_a_folder_of_checkpoints(self, model, tmp_path):
+        for steps in (1000, 500):
+            model.save(tmp_path / f"rl_model_{steps}_steps.zip")
+        found = find_contestants(tmp_path, "right", "none")
+        assert [each.name for each in found] == ["rl_model_500_steps", "rl_model_1000_steps"]
+
     def test_needs_a_problem(self, model, tmp_path):
         model.save(tmp_path / "model.zip")
         with pytest.raises(InvalidInputError, match="model.zip': the model does not say which"):
-            find_contestants(tmp_path / "model.zip")
+            find_contestants(tmp_path / "model.zip", vec_normalize="none")
 
 
 @pytest.mark.parametrize("policy", ["ppo-tuned-both", "ars-tuned-both"])

@@ -138,7 +138,7 @@ def test_a_trained_model_in_compiled_rollouts(observations, tmp_path):
     policy = Policy.from_sb3(model)
     check_same(model, policy, observations)
     assert policy.provenance.environment_steps == 128
-    assert policy.provenance.config["vec_normalize"] is True
+    assert policy.provenance.config["vec_normalize"] == "VecNormalize of its environment"
     simulator = Simulator("right", threads=1)
     starts, goals = simulator.sample(np.random.default_rng(3), 64)
     compiled = simulator.rollout(policy, starts, goals)
