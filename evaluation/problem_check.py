@@ -146,7 +146,7 @@ def random_starts(world: World) -> NDArray[np.float64]:
     """Configurations that the task may start at, whether something touches or not."""
     task, home = world.problem.task, world.arm.home
     if task.starts:
-        return np.array(task.starts)
+        return world.starts
     q = random_configurations(world.contact_model, 2000, seed=1)
     starts: NDArray[np.float64] = home + task.start_spread * (q - home)
     return starts

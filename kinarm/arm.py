@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from kinarm._files import first_line
 from kinarm.arm_specification import AllowedContact, ArmSpecification
-from kinarm.chain import Chain, link_lengths
+from kinarm.chain import Chain, link_lengths, within_limits
 from kinarm.errors import ArmError, finite_array
 from kinarm.meshes import hull_of_mesh
 from kinarm.urdf import Description, read_urdf
@@ -95,7 +95,7 @@ class Arm:
             model=model,
             geometry=_build_shapes(description, model),
             n_actuated=_n_actuated(wanted.actuated, model, chain, description),
-            home=_home(wanted.home, chain),
+            home=_home(wanted.home, chain, tuple(model.names[1:])),
             allowed_contacts=wanted.allowed_contacts or (),
             chain=chain,
         )
@@ -290,11 +290,9 @@ def _n_actuated(
     return len(named)
 
 
-def _home(home: ArrayLike | None, chain: Chain) -> NDArray[np.float64]:
+def _home(home: ArrayLike | None, chain: Chain, names: tuple[str, ...]) -> NDArray[np.float64]:
     """Check a home configuration, or take zero clipped to the limits."""
     if home is None:
         return np.clip(np.zeros(chain.n_joints), chain.lower, chain.upper)
-    given = finite_array("home", home, (chain.n_joints,))
-    if ((given < chain.lower) | (given > chain.upper)).any():
-        raise ArmError(f"home {given.tolist()} lies outside the limits")
-    return given
+    finite_array("home", home, (chain.n_joints,))
+    return within_limits("home", home, chain, names)

@@ -4,10 +4,15 @@ from typing import NamedTuple
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
+
+from kinarm.errors import InvalidInputError, finite_array
 
 FRAME_KINDS = (pin.FrameType.JOINT, pin.FrameType.BODY, pin.FrameType.FIXED_JOINT)
 """Kinds of frames; the first kind counts for a name."""
+
+ROUNDING = 1e-6
+"""How far configurations may lie beyond limits, as encoders and float32 put them [rad or m]."""
 
 
 class Chain(NamedTuple):
@@ -174,3 +179,38 @@ def point_speed(chain: Chain, axis: int, link: int, points: NDArray[np.float64])
     offset = np.linalg.norm(np.cross(chain.axis[axis], following)) + slide
     between = lengths[axis + 2 : link].sum()
     return float(offset + between + np.linalg.norm(points, axis=1).max())
+
+
+def within_limits(
+    name: str, configurations: ArrayLike, chain: Chain, joint_names: tuple[str, ...]
+) -> NDArray[np.float64]:
+    """Clip configurations that rounding put beyond the limits, and refuse those farther out.
+
+    Parameters
+    ----------
+    name : str
+        What they are, for messages.
+    configurations : array_like, shape (n_joints,) or (n, n_joints)
+        Joint positions [rad or m].
+    chain, joint_names
+        The arm.
+
+    Raises
+    ------
+    InvalidInputError
+        If one lies beyond a limit by more than `ROUNDING`.
+    """
+    shape = (chain.n_joints,) if np.ndim(configurations) == 1 else (None, chain.n_joints)
+    given = finite_array(name, configurations, shape)
+    if not ((given < chain.lower) | (given > chain.upper)).any():
+        return given
+    clipped = np.clip(given, chain.lower, chain.upper)
+    beyond = np.abs(given - clipped) > ROUNDING
+    if beyond.any():
+        *row, joint = (int(index) for index in np.argwhere(beyond)[0])
+        value = given[(*row, joint)]
+        raise InvalidInputError(
+            f"{name}{row or ''} lies outside the limits: {joint_names[joint]} at {value:.6g}, "
+            f"{chain.lower[joint]:.6g} to {chain.upper[joint]:.6g} allowed"
+        )
+    return clipped

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from kinarm._parallel import run_rows
 from kinarm.arm import Arm
-from kinarm.chain import Frame, find_frames
+from kinarm.chain import Frame, find_frames, within_limits
 from kinarm.errors import (
     InvalidInputError,
     UnknownNameError,
@@ -182,8 +182,7 @@ class Kinematics(ABC):
         arm = self.arm
         positions, wanted, axes = self._targets(targets, directions, tool_axis)
         start = finite_array("near", arm.home if near is None else near, (arm.n_joints,))
-        if ((start < arm.lower) | (start > arm.upper)).any():
-            raise InvalidInputError(f"near lies outside the limits: {start.tolist()}")
+        start = within_limits("near", start, arm.chain, arm.joint_names)
         search = self._search(axes, start, joints, separation)
         configurations, owner = self._solutions(search, positions, wanted, most)
         if free:

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from kinarm._files import load_archive, reading, save_archive
+from kinarm.chain import within_limits
 from kinarm.episodes import Outcome, Rollouts
 from kinarm.errors import (
     InvalidInputError,
@@ -293,15 +294,7 @@ def _within_limits(world: World, path: ArrayLike) -> NDArray[np.float64]:
     points = finite_array("path", path, (None, world.arm.n_joints))
     if len(points) == 0:
         raise InvalidInputError("path holds no configuration")
-    outside = (points < world.arm.lower) | (points > world.arm.upper)
-    if outside.any():
-        row, joint = np.argwhere(outside)[0]
-        raise InvalidInputError(
-            f"configuration {row} of the path lies outside the limits: "
-            f"{world.arm.joint_names[joint]} at {points[row, joint]:.6g}, "
-            f"{world.arm.lower[joint]:.6g} to {world.arm.upper[joint]:.6g} allowed"
-        )
-    return points
+    return within_limits("path", points, world.arm.chain, world.arm.joint_names)
 
 
 def _stepwise(world: World, points: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -59,7 +59,7 @@ def draw_for_each(
     lower = arm.home + spread * (arm.lower - arm.home)
     extent = spread * (arm.upper - arm.lower)
     goals = world.goals.at(_draw(rngs, [count] * len(rngs), 1 + len(world.goals.moving)))
-    listed = np.array(task.starts)
+    listed = world.starts
     starts = np.tile(arm.home, (len(goals), 1))
     pending = np.arange(len(goals))
     for _ in range(START_ATTEMPTS):

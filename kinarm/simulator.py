@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from kinarm._parallel import run_together
 from kinarm.arm import Arm
+from kinarm.chain import within_limits
 from kinarm.episodes import PAUSED, RUNNING, Control, Episodes, Rollouts, StepResult
 from kinarm.errors import InvalidInputError, StartInContactError, finite_array
 from kinarm.kernels.compiling import Array
@@ -35,7 +36,7 @@ class Simulator:
     tolerance of the goal. Episodes are truncated at the horizon.
 
     Results depend on the inputs alone: not on threads, nor on batches. Arrays of a wrong shape,
-    entries that are not finite and starts beyond the limits are a `kinarm.InvalidInputError`,
+    entries that are not finite and starts more than 1e-6 beyond the limits are a `kinarm.InvalidInputError`,
     starts that touch something a `kinarm.StartInContactError`.
 
     Parameters
@@ -225,11 +226,7 @@ class Simulator:
         """Copy starts and goals, or refuse them."""
         q = finite_array("starts", starts, (None, self.arm.n_joints))
         goal = finite_array("goals", goals, (len(q), 3))
-        outside = (q < self.arm.lower) | (q > self.arm.upper)
-        if outside.any():
-            index = int(outside.any(axis=1).argmax())
-            raise InvalidInputError(f"start {index} lies outside the limits: {q[index].tolist()}")
-        return q, goal
+        return within_limits("starts", q, self.arm.chain, self.arm.joint_names), goal
 
     def _begin(
         self, starts: Array, goals: Array, *, record: bool, shift: Array | None = None

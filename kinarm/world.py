@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from kinarm._parallel import available_threads, run_rows
-from kinarm.chain import Chain
+from kinarm.chain import Chain, within_limits
 from kinarm.clearance import Clearance, flattened, measure_clearance
 from kinarm.collision import Contact, ContactModel
 from kinarm.contact_shapes import PLANE, ContactShapes
@@ -42,6 +42,8 @@ class World(Kinematics):
         What it was built from.
     contact_model : ContactModel
         Shapes that may touch.
+    starts : ndarray, shape (n, n_joints)
+        The task's starts [rad or m]; empty if it has none.
     rules : Rules
         Task and motion limits for the kernels.
     """
@@ -53,7 +55,7 @@ class World(Kinematics):
         )
         self.arm = self.problem.load_arm()
         self.contact_model = ContactModel.build(self.arm, self.problem.scene)
-        self._check_starts()
+        self.starts = self._checked_starts()
         task, stepping = self.problem.task, self.problem.stepping
         n_tested = stepping.tested_configurations
         self.rules = Rules(
@@ -66,16 +68,16 @@ class World(Kinematics):
         self._idle: list[tuple[Block, Alone]] = []
         self._shares = np.arange(1, n_tested + 1)[:, None] / n_tested
 
-    def _check_starts(self) -> None:
-        """Refuse impossible starts of the task."""
+    def _checked_starts(self) -> Array:
+        """The task's starts, shape (n, n_joints), if all are possible [rad or m]."""
+        arm, starts = self.arm, np.empty((len(self.problem.task.starts), self.arm.n_joints))
         for number, start in enumerate(self.problem.task.starts):
             name = f"task.starts[{number}]"
-            q = finite_array(name, start, (self.arm.n_joints,))
-            if ((q < self.arm.lower) | (q > self.arm.upper)).any():
-                raise ProblemError(f"{name} lies outside the limits: {list(start)}")
-            pair = self.contact_model.contact_pair(q)
+            starts[number] = within_limits(name, start, arm.chain, arm.joint_names)
+            pair = self.contact_model.contact_pair(starts[number])
             if pair is not None:
                 raise ProblemError(f"{name} is in contact: {pair[0]} touches {pair[1]}")
+        return starts
 
     def __repr__(self) -> str:
         return f"World({self.problem!r})"

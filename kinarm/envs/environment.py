@@ -188,7 +188,7 @@ class ArmEnvironment(Lifecycle):
         n_joints = self.simulator.arm.n_joints
         fixed = fixed_scenario(options, n_joints)
         if "start" in fixed:  # refuse one in contact
-            self.simulator.reset(fixed["start"][None], np.zeros((1, 3)))
+            fixed["start"] = self.simulator.reset(fixed["start"][None], np.zeros((1, 3))).q[0]
         if self._episodes is None:
             q, goals = np.empty((self._n_arms, n_joints)), np.empty((self._n_arms, 3))
         else:

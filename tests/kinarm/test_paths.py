@@ -89,7 +89,7 @@ def test_replay_in_one_call(simulator, tmp_path):
         (np.full((2, 6), np.nan), "path must be finite"),
         (
             [np.zeros(6), [0, 0, 4, 0, 0, 0]],
-            r"configuration 1 of the path lies outside the limits: axis_3 at 4, -1\.25664 to 3\.22",
+            r"path\[1\] lies outside the limits: axis_3 at 4, -1\.25664 to 3\.22",
         ),
     ],
 )

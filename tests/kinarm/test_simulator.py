@@ -10,12 +10,16 @@ import numpy as np
 import pytest
 from simulators import changed
 
+from kinarm.arm import Arm
+from kinarm.envs import ReachEnv
 from kinarm.episodes import COLLISION
-from kinarm.errors import InvalidInputError, StartInContactError
+from kinarm.errors import InvalidInputError, KinarmError, StartInContactError
 from kinarm.kernels.rollout import advance, begin
 from kinarm.kernels.screening import screen
 from kinarm.networks import Mirror, Networks
 from kinarm.observation import observation_signs
+from kinarm.problem import ReachProblem
+from kinarm.recording import record_path
 from kinarm.reference import ReferenceSimulator
 from kinarm.scene import Scene
 from kinarm.simulator import Simulator
@@ -236,7 +240,7 @@ class TestRefusals:
         ("given", "message"),
         [
             ({"starts": np.zeros((2, 5))}, r"starts must have shape \(n, 6\), got \(2, 5\)"),
-            ({"starts": np.full((1, 6), 9.0)}, "start 0 lies outside the limits"),
+            ({"starts": np.full((1, 6), 9.0)}, r"starts\[0\] lies outside the limits"),
             ({"goals": [[0, np.inf, 0]]}, r"goals must be finite, got inf at \[0, 1\]"),
             ({"policies": np.zeros((1, 63, 5))}, r"actions must have shape \(1, 64, 5\)"),
             ({"policies": lambda _: np.full((1, 5), np.nan)}, "actions must be finite"),
@@ -253,6 +257,44 @@ class TestRefusals:
     def test_of_rollouts(self, simulator, given, message):
         with pytest.raises(InvalidInputError, match=message):
             asked(simulator, **given)
+
+
+@pytest.mark.parametrize("dtype", [np.float32, np.float64])
+def test_what_rounding_puts_beyond_a_limit_is_clipped_everywhere(dtype):
+    """As encoders and float32 do; farther out it is refused everywhere."""
+    problem = ReachProblem.load("right")
+    arm = problem.load_arm()
+    joint = np.arange(6) == np.argmax(arm.upper.astype(np.float32) > arm.upper)
+    limit = np.where(joint, arm.upper, 0.0)
+    start = limit.astype(dtype) + (dtype == np.float64) * 1e-7 * joint
+    assert (start > arm.upper).any()
+    off = start + 1e-5 * joint
+    goal, still = [[0, -0.5, 0.4]], lambda seen: np.zeros((len(seen), 5))
+    simulator, env = Simulator(problem), ReachEnv(problem)
+
+    def task_starts(given):
+        return Simulator(problem.replace(starts=(tuple(map(float, given)),))).sample(
+            np.random.default_rng(0), 1
+        )[0][0]
+
+    def home(given):
+        return Arm.load(home=tuple(map(float, given))).home
+
+    calls = [
+        lambda given: simulator.rollout(still, [given], goal, record=True).configurations[0],
+        lambda given: simulator.reset([given], goal).q[0],
+        lambda given: env.reset(options={"start": given}) and env.episodes.q[0],
+        lambda given: record_path(simulator.world, [given, limit]).states[0],
+        task_starts,
+        home,
+    ]
+    for call in calls:
+        np.testing.assert_array_equal(np.asarray(call(start))[:6], limit)
+        with pytest.raises(KinarmError, match="outside the limits: axis_"):
+            call(off)
+    assert len(simulator.world.inverse_kinematics([0.2, -0.5, 0.4], near=start))
+    with pytest.raises(KinarmError, match="near lies outside the limits: axis_"):
+        simulator.world.inverse_kinematics([0.2, -0.5, 0.4], near=off)
 
 
 @pytest.mark.parametrize(("name", "doubtful"), [("paper", False), ("mesh", True)])
