@@ -15,7 +15,7 @@ from typing import Any, Literal, TypeVar, Union, get_args, get_origin, get_type_
 import numpy as np
 
 from kinarm._files import first_line
-from kinarm.errors import InvalidInputError, KinarmError, check_range
+from kinarm.errors import InvalidInputError, KinarmError, check_range, meant
 
 T = TypeVar("T")
 
@@ -100,7 +100,7 @@ def from_plain(kind: type[T], entries: object, where: str, path: str = "") -> T:
     for key in entries:
         if key not in known:
             raise InvalidInputError(
-                f"{where}: unknown key '{path}{key}'; available: {', '.join(known)}"
+                f"{where}: unknown key '{path}{key}'{meant(key, known)}; available: {', '.join(known)}"
             )
     for name, item in known.items():
         if name not in entries and item.default is MISSING and item.default_factory is MISSING:

@@ -86,7 +86,18 @@ class UnknownNameError(InvalidInputError):
 
     def __init__(self, kind: str, given: str, available: Iterable[str]) -> None:
         self.kind, self.given, self.available = kind, given, tuple(available)
-        super().__init__(f"unknown {kind} {given!r}; available: {', '.join(self.available)}")
+        super().__init__(
+            f"unknown {kind} {given!r}{meant(given, self.available)}; "
+            f"available: {', '.join(self.available)}"
+        )
+
+
+def meant(given: str, available: Iterable[str]) -> str:
+    """Suggest the most similar of the available names, if one is similar."""
+    from difflib import get_close_matches
+
+    similar = get_close_matches(given, list(available), 1)
+    return f" (did you mean {similar[0]!r}?)" if similar else ""
 
 
 class StartInContactError(KinarmError):

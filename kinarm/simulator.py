@@ -36,8 +36,8 @@ class Simulator:
     tolerance of the goal. Episodes are truncated at the horizon.
 
     Results depend on the inputs alone: not on threads, nor on batches. Arrays of a wrong shape,
-    entries that are not finite and starts more than 1e-6 beyond the limits are a `kinarm.InvalidInputError`,
-    starts that touch something a `kinarm.StartInContactError`.
+    entries that are not finite and starts more than 1e-6 beyond the limits are a
+    `kinarm.InvalidInputError`, starts that touch something a `kinarm.StartInContactError`.
 
     Parameters
     ----------
