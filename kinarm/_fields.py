@@ -99,8 +99,9 @@ def from_plain(kind: type[T], entries: object, where: str, path: str = "") -> T:
     known = init_fields(kind)
     for key in entries:
         if key not in known:
+            similar = meant(key, known)
             raise InvalidInputError(
-                f"{where}: unknown key '{path}{key}'{meant(key, known)}; available: {', '.join(known)}"
+                f"{where}: unknown key '{path}{key}'{similar}; available: {', '.join(known)}"
             )
     for name, item in known.items():
         if name not in entries and item.default is MISSING and item.default_factory is MISSING:

@@ -97,7 +97,7 @@ class TestFile:
     @pytest.mark.parametrize(
         ("text", "message"),
         [
-            ("[task]\nhorizons = 3", "unknown key 'task.horizons'; available: .*horizon"),
+            ("[task]\nhorizons = 3", "unknown key 'task.horizons' .did you mean 'horizon'"),
             ('[task]\ntolerance = "5 cm"', r"task.tolerance must be a number \[m\], got '5 cm'"),
             ("[task.reward]\ncollision = 1", "task.reward: .*collision = 1 rewards contact"),
             ('[task]\ngoal_regions = ["up"]', "goal region in task.goal_regions: 'up'"),

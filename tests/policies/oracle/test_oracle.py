@@ -224,7 +224,7 @@ class TestRefusals:
             ([HOME[:5]], [GOAL], "starts must have shape"),
             ([["x"] * 6], [GOAL], "starts must be numbers"),
             ([HOME], [GOAL, GOAL], "goals must have shape"),
-            ([HOME, [0.0, 0.0, 9.0, 0.0, 0.0, 0.0]], [GOAL, GOAL], "start 1 lies outside"),
+            ([HOME, [0.0, 0.0, 9.0, 0.0, 0.0, 0.0]], [GOAL, GOAL], r"starts\[1\] lies outside"),
             ([HOME], [[0.0, 0.0, -np.inf]], "goals must be finite"),
         ],
     )
