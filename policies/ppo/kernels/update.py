@@ -143,8 +143,8 @@ def add_gradients(
     first, last : int
         Which parts.
     actor, critic : Network
-        Networks, whose parameters lie in one array; the logarithms of the standard deviations of
-        the actions are its last entries, padded.
+        Networks whose parameters lie in one array; its last entries, padded, are the logarithms of
+        the standard deviations.
     chosen : ndarray of int, shape (batch_size,)
         Rows of the minibatch.
     standard : tuple of float
