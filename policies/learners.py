@@ -180,7 +180,7 @@ def learner_names() -> tuple[str, ...]:
 
 
 def find_learner(name: str) -> Learner[Any, Any]:
-    """Look a learner up by name or as ``module:LEARNER``, also in this folder.
+    """Look a learner up by name or ``module:LEARNER``, also in the current folder.
 
     Raises
     ------
@@ -234,7 +234,7 @@ def train_policy(
 def training_states(
     config: TrainingConfig, state: TrainingState | None = None, **options: Any
 ) -> Iterator[Any]:
-    """States of a training: the first one, then one after every iteration.
+    """States of a training: the given or initial one, then one per iteration.
 
     Parameters
     ----------

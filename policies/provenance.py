@@ -79,8 +79,7 @@ class Provenance:
 
     def to_json(self) -> dict[str, Any]:
         """As a dictionary that JSON can hold."""
-        entries: dict[str, Any] = to_plain(self)
-        return entries
+        return dict(to_plain(self))
 
     @classmethod
     def from_json(cls, entries: Mapping[str, Any]) -> "Provenance":

@@ -88,9 +88,9 @@ class ARSConfig(TrainingConfig):
     def __post_init__(self) -> None:
         super().__post_init__()
         if self.top_directions > self.directions:
-            limit, given = self.directions, self.top_directions
             raise InvalidInputError(
-                f"top_directions must be at most directions ({limit}), got {given}"
+                f"top_directions must be at most directions ({self.directions}), "
+                f"got {self.top_directions}"
             )
 
     @property

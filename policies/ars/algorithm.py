@@ -217,8 +217,7 @@ def ars_step(config: ARSConfig, delta: Array, returns: Array, step_size: float) 
     sigma = mean_and_deviation(returns.reshape(-1))[1] if config.scale_by_deviation else 1.0
     if sigma < 1e-12:
         return np.zeros(delta.shape[1:])
-    difference = returns[0, top] - returns[1, top]
-    weights = step_size / (b * sigma) * difference
+    weights = step_size / (b * sigma) * (returns[0, top] - returns[1, top])
     step: Array = (weights[:, None, None] * delta[top]).sum(axis=0)
     return step
 

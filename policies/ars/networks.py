@@ -42,8 +42,7 @@ def first_deviations(n_joints: int) -> Array:
     """
     parts = list(part_slices(n_joints).values())
     sizes = np.array([part.stop - part.start for part in parts])
-    deviations: Array = np.repeat(DEVIATION / np.sqrt(len(parts) * sizes), sizes)
-    return deviations
+    return np.repeat(DEVIATION / np.sqrt(len(parts) * sizes), sizes)
 
 
 def initial_network(rng: np.random.Generator, deviations: Array, widths: Sequence[int]) -> Array:

@@ -99,7 +99,6 @@ def policy_from_sb3(
     simulator = Simulator(own, threads=1)
     interface, selection, sizes = model_inputs(model.policy, simulator)
     model.policy.set_training_mode(False)
-    pieces = [selection, *normalization(statistics, sizes), *_actor_pieces(model.policy)]
     config = {
         key: value
         for key, value in model.attributes.items()
@@ -112,7 +111,7 @@ def policy_from_sb3(
         config["vec_normalize"] = str(vec_normalize) if is_file else True
     policy = policy_of_pieces(
         kind,
-        pieces,
+        [selection, *normalization(statistics, sizes), *_actor_pieces(model.policy)],
         own,
         algorithm=model.algorithm,
         recipe="sb3",

@@ -108,7 +108,7 @@ class Prover:
         box : tuple of ndarray, shape (n, n_actions)
             Lower and upper corners of where the others can be [rad or m].
         resolution : float
-            See `RESOLUTION`.
+            How far a proven distance may be below the smallest one [m].
         """
         n, n_moved = len(starts), self._simulator.n_actions
         distances, configurations = np.empty((n, 2)), np.empty(starts.shape)

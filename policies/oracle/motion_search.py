@@ -191,10 +191,8 @@ def two_segments(
     second = (ends - vias)[:, moved] / (after[:, None] * simulator.step_limit)
     step = np.arange(simulator.task.horizon)[None, :, None]
     turning, ending = turn[:, None, None], steps[:, None, None]
-    actions: Array = np.where(
-        step < turning, first[:, None], np.where(step < ending, second[:, None], 0.0)
-    )
-    return actions
+    later = np.where(step < ending, second[:, None], 0.0)
+    return np.where(step < turning, first[:, None], later)
 
 
 def along_path(simulator: Simulator, path: Array, *, through_corners: bool) -> Array | None:

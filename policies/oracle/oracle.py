@@ -140,8 +140,7 @@ class Oracle:
         blocked = np.flatnonzero((fewest > horizon) & (steps_bounds <= horizon))
         last = np.full(blocked.size, horizon)
         beyond, _ = bound_steps(*trials, blocked, last, last, contact=True)
-        unsettled = ~search.reached & (steps_bounds <= horizon)
-        complete[unsettled] = False
+        complete[~search.reached & (steps_bounds <= horizon)] = False
         shut = blocked[beyond > horizon]
         steps_bounds[shut], complete[shut] = horizon + 1, True
 

@@ -134,9 +134,8 @@ class ActorCritic:
 
     def __init__(self, widths: Sequence[int]) -> None:
         self.n_parameters, n_actions = _count(widths), widths[-1]
-        every = np.arange(self.n_parameters)
-        numbers = split_parameters(every, widths)
-        self._places = np.zeros_like(every)
+        numbers = split_parameters(np.arange(self.n_parameters), widths)
+        self._places = np.zeros(self.n_parameters, dtype=np.int64)
         tables, end, turned = [], 0, 0
         for layers in (numbers.actor, numbers.critic):
             table, end, turned = self._place(layers, end, turned)

@@ -231,5 +231,4 @@ def imitate(
             find_gradients(threads, *nets, *arrays)
             done = (epoch * batches + number) / (EPOCHS * batches)
             descent = Descent(LEARNING_RATE * (1 - done), 0.9, 0.999, 1e-8, 1e9)
-            steps = epoch * batches + number + 1
-            descend(*nets, *moments, gradients, descent, steps)
+            descend(*nets, *moments, gradients, descent, epoch * batches + number + 1)

@@ -48,7 +48,7 @@ class SB3Config(TrainingConfig):
     training_tolerance : float, optional
         Distance that counts as a success in the training [m]; by default the task's tolerance.
     hindsight : bool
-        Whether it learns with goals and hindsight replay.
+        Whether it learns in the goal-conditioned environment, with hindsight replay.
     normalize : bool
         Whether running statistics normalise observations.
     action_noise : float

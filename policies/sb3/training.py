@@ -82,9 +82,8 @@ class SteppedLearning:
     def _learn(self) -> None:
         self._may_go_on.acquire()
         torch.set_num_threads(1)
-        environment_steps = self._steps * self.model.n_envs
         try:
-            self.model.learn(environment_steps, callback=self._after_step)
+            self.model.learn(self._steps * self.model.n_envs, callback=self._after_step)
         except BaseException as error:  # raised in `step`
             self._error = error
         self._has_stopped.release()
