@@ -1,8 +1,7 @@
 """The contract of learners, how they are found, and the loop that trains them.
 
-A learner is an attribute ``LEARNER`` of a module, such as `kinarm.policies.ars`; it needs no base
-class. Those of other packages are found by their names in the entry-point group
-``kinarm.learners``, or as ``module:LEARNER``.
+A learner is an attribute ``LEARNER`` of a module, such as `kinarm.policies.ars`. Those of other
+packages are found by name in the entry-point group ``kinarm.learners``, or as ``module:LEARNER``.
 """
 
 import sys
@@ -29,10 +28,9 @@ class CurvePoint(NamedTuple):
     Attributes
     ----------
     mean_return, std_return, success : float
-        Mean and standard deviation of the returns of the iteration's episodes, and share that
-        reached the goal; for PPO, of those that ended in it, and for algorithms of
-        Stable-Baselines3, of the last hundred that ended. Replays of failed scenarios do not count;
-        NaN if no episode does.
+        Mean and standard deviation of the returns of the iteration's episodes, and share of
+        success; for PPO, of those that ended in it, and for Stable-Baselines3, of the last hundred
+        that ended. Replays of failed scenarios do not count; NaN if no episode does.
     environment_steps, wall_time : int and float
         Steps and time of the iterations [s] since the training began.
     """
@@ -216,7 +214,7 @@ def train_policy(
     config : ARSConfig, PPOConfig or settings of another learner
         The settings.
     state : TrainingState, optional
-        Where to go on; the result equals that of an uninterrupted training bit for bit.
+        Where to go on, bit for bit as without an interruption.
     on_iteration : callable, optional
         Called with the state after every iteration.
     **options

@@ -1,9 +1,9 @@
 """Reflection about the x-z plane, and its effect on observations and actions.
 
-The reflection y -> -y maps the right bench to the left one and an arm that is symmetric about its
-x-z plane to itself, with joints that turn about x or z reversed. Observations and actions only
-change signs. A policy with a mirror sees goals on the left reflected, and its actions are reflected
-in turn: it does the same on both benches.
+The reflection y -> -y swaps the benches, and reverses the joints that turn about x or z of an arm
+that is symmetric about its x-z plane. Observations and actions only change signs. A policy with a
+mirror sees goals on the left reflected, and its actions are reflected in turn: it does the same on
+both benches.
 """
 
 import math

@@ -303,8 +303,8 @@ GOAL_KEYS = ("observation", "achieved_goal", "desired_goal")
 def flat_observation(given: Mapping[str, ArrayLike], n_observations: int) -> NDArray[np.float64]:
     """Make a flat observation of a dictionary observation.
 
-    It holds ``observation``, shape (..., n_own), and ``achieved_goal`` and ``desired_goal``, shape
-    (..., 3) [m], nothing else. The flat one has the shape (..., n_observations).
+    It holds just ``observation``, shape (..., n_own), ``achieved_goal`` and ``desired_goal``, shape
+    (..., 3) [m]. The flat one has the shape (..., n_observations).
     """
     if set(given) != set(GOAL_KEYS):
         raise InvalidInputError(

@@ -31,9 +31,8 @@ def recipe(learner: str, name_or_file: str | Path | None = None, **changes: Any)
         its entry ``base`` names. The default is the learner's first one: that of the paper for ARS
         and PPO.
     **changes
-        Fields to replace; None leaves a field as it is. A mapping replaces the entries that it
-        names, such as weights of the ``reward``. If another field than problem and seed changes,
-        the recipe's name gets a star.
+        Fields to replace; None leaves a field as it is, a mapping replaces the entries that it
+        names. If another field than problem and seed changes, the recipe's name gets a star.
 
     Returns
     -------
@@ -122,8 +121,8 @@ def shipped_learner(name: str, config: type[ConfigT], **parts: Any) -> Learner[C
 def adapted(config: ConfigT, apart: Mapping[str, ConfigT]) -> ConfigT:
     """Adapt a recipe to its problem, if it is symmetric.
 
-    Progress is rewarded in proportion to the arm's reach, and tolerances of the training are shares
-    of the task's.
+    Progress is rewarded in proportion to the arm's reach, and training tolerances are shares of the
+    task's.
 
     Parameters
     ----------

@@ -106,8 +106,8 @@ class TrainRequest(ProblemOptions):
     def run(self) -> TrainingResult:
         """Train, and write the policy and its learning curve.
 
-        A checkpoint beside the policy is renewed every few seconds. It is complete after an
-        interruption, too, and the message of `KeyboardInterrupt` says so.
+        A checkpoint beside the policy is renewed every few seconds, and complete after an
+        interruption.
         """
         if self.resume:
             config, state = self._checkpoint()
@@ -193,8 +193,8 @@ class TrainRequest(ProblemOptions):
 def say_findings(config: TrainingConfig) -> None:
     """Say on standard error what was chosen, and what hinders the training.
 
-    The latter is many goals out of reach, except in the known problems of the paper; or a
-    ``symmetric`` that has no effect.
+    The latter is many goals out of reach, but in the paper's problems, or a ``symmetric`` without
+    effect.
     """
     from kinarm.clearance import reach_warning
     from kinarm.policies.mirror import missing_mirror

@@ -44,8 +44,8 @@ class ARSConfig(TrainingConfig):
     top_directions : int
         Perturbations b that enter the update, the best ones; b = N is V1 or V2.
     symmetric : bool
-        Whether the policy treats mirror images alike, if arm and obstacles are their own; it then
-        learns from goals on the right and mirror images of those on the left.
+        Whether the policy treats mirror images alike, if arm and obstacles are symmetric; it then
+        learns from goals on the right and mirror images of others.
     net_arch : tuple of int
         Widths of hidden layers with tanh; without any, the policy is linear.
     normalize : bool
@@ -58,7 +58,7 @@ class ARSConfig(TrainingConfig):
     episodes : int
         Episodes whose mean return judges a perturbed policy.
     replay_share : float
-        Probability of replaying a scenario that at least half of its policies failed; see
+        Probability of replaying a scenario that half of its policies or more failed; see
         `kinarm.failed_scenarios`.
     replay_size : int
         Failed scenarios that are kept.

@@ -32,8 +32,8 @@ SETTLED = 0.9
 class PPOConfig(TrainingConfig):
     """Settings of a training of 1.2 million environment steps, as in the paper.
 
-    The paper gives no other settings. Names and defaults are those of Stable-Baselines3, but for
-    two, for speed: 16 environments fill the rollouts of 2000 steps, and minibatches are larger.
+    The paper gives no others. Names and defaults are those of Stable-Baselines3. For speed, 16
+    environments fill the rollouts of 2000 steps, and minibatches are larger.
 
     Parameters
     ----------
@@ -70,26 +70,25 @@ class PPOConfig(TrainingConfig):
     log_std_init : float
         Initial logarithm of the standard deviation of the actions.
     final_log_std : float, optional
-        Final logarithm of the standard deviation, to which it changes linearly. Without it, PPO
-        learns the standard deviation.
+        Final logarithm of the standard deviation, which changes linearly; without it, PPO learns
+        it.
     training_tolerance : float, optional
         Distance that counts as a success in the training [m]; by default the task's tolerance.
     initial_tolerance : float, optional
         Training tolerance until start spread and discount are final; then it changes geometrically
-        to the final tolerance [m].
+        [m].
     stop_at_goal : bool
         Whether success in the training takes two steps in a row within the tolerance, so that the
-        hand does not only pass the goal. At the last step, one is enough.
+        hand stops at the goal. At the last step, one is enough.
     symmetric : bool
-        Whether the policy treats mirror images alike, if arm and obstacles are their own; it then
-        learns from goals on the right and mirror images of those on the left.
+        Whether the policy treats mirror images alike, if arm and obstacles are symmetric; it then
+        learns from goals on the right and mirror images of others.
     initial_start_spread : float
         Initial spread of the start configurations, as a share of the task's.
     initial_gamma : float, optional
         Initial discount per step; by default ``gamma``.
     initial_penalty : float
-        Share of the penalty for contact that counts at the beginning; it grows linearly to the
-        whole at the end.
+        Share of the penalty for contact that counts at first; it grows linearly to the whole.
     widening : float
         Share of the training in which spread and discount change linearly.
     replay_share : float
@@ -99,7 +98,7 @@ class PPOConfig(TrainingConfig):
         Failed scenarios that are kept.
     replay_log_std : float, optional
         Smallest logarithm of the standard deviation in replayed episodes: with less noise, a policy
-        never succeeds where it always fails. By default they have the noise of others.
+        never succeeds where it always fails. By default there is none.
     replay_noise_steps : int, optional
         First steps of a replayed episode that have that noise; by default all.
     initial_policy : str, optional
@@ -199,7 +198,7 @@ class PPOConfig(TrainingConfig):
         return self._widened(self.initial_gamma, self.gamma, done)
 
     def log_std_at(self, done: float) -> float | None:
-        """Logarithm of the deviation after this share of the training, if set."""
+        """Logarithm of the deviation after a share of the training, if set."""
         if self.final_log_std is None:
             return None
         settled = min(1.0, done / SETTLED)
@@ -222,7 +221,7 @@ class PPOConfig(TrainingConfig):
         return self.initial_penalty + (1 - self.initial_penalty) * done
 
     def _widened(self, initial: float, final: float, done: float) -> float:
-        """A value between an initial and a final one, after this share of the training."""
+        """A value between two, after this share of the training."""
         if done >= self.widening:
             return final
         grown = done / self.widening

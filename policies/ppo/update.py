@@ -1,8 +1,7 @@
 """Updates of actor and critic by Adam, and imitation of the oracle.
 
-Before a training, an actor may imitate the oracle, since reinforcement spends most of its steps on
-finding the goals at all. Imitation alone reaches far fewer goals: it never sees where its own
-errors lead.
+An actor may imitate the oracle first, since reinforcement spends most steps on finding the goals at
+all. Imitation alone reaches far fewer goals: it never sees where its own errors lead.
 """
 
 from typing import Any, NamedTuple

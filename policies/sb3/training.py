@@ -1,8 +1,8 @@
 """Training with an algorithm of Stable-Baselines3 or sb3-contrib, in steps.
 
 The algorithm's own ``learn`` runs in a thread that waits after every step, so that it can be
-evaluated in the course of its training. Replay buffer, optimisers and generators cannot all be
-saved without pickle. A training therefore goes on by repeating what was done, to the same bits.
+evaluated meanwhile. Replay buffer, optimisers and generators cannot all be saved without pickle. A
+training therefore goes on by repeating what was done, to the same bits.
 """
 
 import threading

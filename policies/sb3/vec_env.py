@@ -84,8 +84,7 @@ class SB3VecEnv(Lifecycle, VecEnv):
     def restore_failed(self, starts: ArrayLike, goals: ArrayLike) -> None:
         """Replay the `failed` scenarios of an earlier environment instead.
 
-        A reset with a seed goes back to them, so that the same seed gives the same episodes, even
-        if a learner seeds later.
+        A reset with a seed goes back to them: the same seed gives the same episodes.
 
         Parameters
         ----------

@@ -8,8 +8,8 @@ for all |e_i| <= h_i, with the Jacobian J and the second derivatives H of the to
 what is of third order. A second bound needs no tool: the origin of the k-th joint moves no farther
 than its swing, and the tool is no farther from it than its length.
 
-Two points prove contact throughout a box if they stay closer than the radii: one of each body's
-axis, or one of obstacle or ground. Bodies that are only enclosed by a capsule prove nothing.
+Two points, of the axes of bodies or of obstacle or ground, prove contact throughout a box if they
+stay closer than the radii. Bodies that are only enclosed by a capsule prove nothing.
 
 No branch depends on values, so that lanes may hold a box each.
 """
@@ -173,8 +173,8 @@ def trim(
 ) -> float:
     """Cut off what is beyond the cutoff; return the share that is left.
 
-    Takes a bound of at most the cutoff, and what `curved_bound` filled in. A joint is cut where it
-    exceeds the cutoff with all others where they add least.
+    Takes a bound of at most the cutoff, and what `curved_bound` filled in. A joint is cut where the
+    bound exceeds the cutoff though all others add least.
     """
     share: float = 0.0 * half[0] + 1.0
     for i in range(half.shape[0]):

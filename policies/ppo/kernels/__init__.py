@@ -2,5 +2,5 @@
 
 Arrays are of single precision, as in Stable-Baselines3. Results are the same bits on every machine:
 nothing is computed by libm, BLAS or torch, and the order of every sum is fixed. Products are fused
-with sums (IEEE 754's ``fusedMultiplyAdd``), slowly where the processor has no such instruction.
+with sums (IEEE 754's ``fusedMultiplyAdd``).
 """

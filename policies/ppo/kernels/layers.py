@@ -148,9 +148,9 @@ class Network(NamedTuple):
     """A dense network with tanh between its layers.
 
     ``layers`` holds per layer its widths, and where its weights begin in ``weights`` (inputs x
-    outputs, then the bias) and, transposed, in ``turned``, and its inputs and outputs in a work
-    space. Rows are padded with zeros to whole vectors. ``work`` is the least length of the work
-    space, ``widest`` the largest padded width.
+    outputs, then the bias) and, transposed, in ``turned``, and values in a work space. Rows are
+    padded with zeros to whole vectors. ``work`` is the least length of the work space, ``widest``
+    the largest padded width.
     """
 
     layers: NDArray[np.int64]
