@@ -7,17 +7,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kinarm._fields import OPTIONAL
-from kinarm.errors import InvalidInputError
+from kinarm.errors import POSITIVE, SHARE, InvalidInputError
 from kinarm.failed_scenarios import LARGEST_REPLAY, FailedScenarios
-from kinarm.policies.config import (
-    MANY,
-    POSITIVE,
-    SHARE,
-    WIDTHS,
-    Schedule,
-    TrainingConfig,
-    scheduled,
-)
+from kinarm.policies.config import MANY, WIDTHS, Schedule, TrainingConfig, scheduled
 from kinarm.policies.learners import TrainingState, imported
 from kinarm.policies.normalizer import Normalizer
 from kinarm.policies.recipes import shipped_learner

@@ -8,17 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kinarm._fields import OPTIONAL
-from kinarm.errors import InvalidInputError
+from kinarm.errors import NOT_NEGATIVE, POSITIVE, SHARE, InvalidInputError
 from kinarm.failed_scenarios import LARGEST_REPLAY, FailedScenarios
-from kinarm.policies.config import (
-    MANY,
-    NOT_NEGATIVE,
-    POSITIVE,
-    SHARE,
-    WIDTHS,
-    Schedule,
-    TrainingConfig,
-)
+from kinarm.policies.config import MANY, WIDTHS, Schedule, TrainingConfig
 from kinarm.policies.learners import TrainingState, imported
 from kinarm.policies.normalizer import Normalizer
 from kinarm.policies.recipes import shipped_learner
