@@ -22,7 +22,7 @@ RANKING = "ranking.json"
 """File of the best shipped policies, by docs/ranking.py."""
 
 SEEN = 10_000
-"""Observations that an initial policy's statistics count for: new ones soon outweigh them."""
+"""Weight of an initial policy's statistics, in observations; new ones soon outweigh it."""
 
 
 def policy_names() -> tuple[str, ...]:
@@ -43,8 +43,8 @@ def group_of(name: str) -> str:
 def best_policy(problem: ProblemLike | None) -> str:
     """Name of the best shipped policy for a problem.
 
-    It was chosen by what policies reach of the shipped problem; another tolerance, horizon, reward
-    or spread of the starts does not change the choice.
+    It was chosen by what policies reach of the shipped problem, whatever tolerance, horizon, reward
+    or spread of the starts this one has.
     """
     if problem is None:
         raise InvalidInputError(f"{BEST!r} is the best policy for a problem: name a --problem")
@@ -68,8 +68,8 @@ def load_policy(name_or_file: str | Path, problem: ProblemLike | None = None) ->
     Parameters
     ----------
     name_or_file : str or Path
-        Name of a shipped policy; of a group, for its first seed; ``"best"``; or path of a file, or
-        of a folder, for the first policy in it.
+        Name of a shipped policy, or of a group for its first seed; ``"best"``; or path of a file,
+        or of a folder for the first policy in it.
     problem : ReachProblem, str or Path, optional
         What the best one is for.
 

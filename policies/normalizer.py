@@ -25,7 +25,7 @@ def fold_normalizer(
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Make affine layers that take raw instead of normalised observations.
 
-    Sums have a fixed order, which those of BLAS do not.
+    Sums have a fixed order, unlike those of BLAS.
 
     Parameters
     ----------

@@ -38,7 +38,7 @@ def perturbations(rng: np.random.Generator, shape: tuple[int, ...]) -> Array:
 def first_deviations(n_joints: int) -> Array:
     """Standard deviations of the first layer's initial weights, shape (n_observations,).
 
-    All parts of the observation count alike: else the few entries of the goal would drown.
+    All parts of the observation count alike, or the few entries of the goal would drown.
     """
     parts = list(part_slices(n_joints).values())
     sizes = np.array([part.stop - part.start for part in parts])
@@ -53,8 +53,8 @@ def initial_network(rng: np.random.Generator, deviations: Array, widths: Sequenc
     rng : numpy.random.Generator
         Draws the other weights, normal numbers.
     deviations : ndarray, shape (n_observations,)
-        Standard deviations of the first layer's weights by input; those of others are one over the
-        root of the layer's inputs.
+        Standard deviations of the first layer's weights by input; in others, one over the root of
+        the inputs.
     widths : sequence of int
         Widths of the layers after the observation.
 

@@ -1,6 +1,6 @@
 """Networks of PyTorch as layers of a policy.
 
-Affine maps, clips and activation functions are joined into layers with a function each.
+Affine maps, clips and functions are joined into layers with a function each.
 """
 
 from collections.abc import Iterable, Iterator, Mapping
@@ -44,8 +44,8 @@ def chained(
 ) -> tuple[tuple[Layer, ...], tuple[Activation, ...]]:
     """Join pieces into layers, and the function after each.
 
-    Affine maps in a row become one. A clip to other limits than -1 and 1 becomes ``hardtanh``
-    between two scalings, which join their neighbours.
+    Affine maps in a row become one. A clip becomes ``hardtanh`` between two scalings, which join
+    their neighbours.
     """
     layers: list[Layer] = []
     activations: list[Activation] = []

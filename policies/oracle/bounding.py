@@ -46,8 +46,8 @@ class Prover:
     ) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
         """Prove how many steps it takes at least to reach goals.
 
-        Returned are lower bounds for the trials in ``rows``, and whether a configuration that
-        counts attains them, or none reaches the goal in ``most``.
+        Returned are lower bounds for the ``rows``, and whether a configuration that counts attains
+        them, or none reaches the goal in ``most``.
 
         Parameters
         ----------

@@ -1,6 +1,6 @@
 """Search for the motions that reach goals in the fewest steps.
 
-Detours around obstacles are planned by RRT-Connect with shortcuts (Kuffner and LaValle 2000).
+Detours are planned by RRT-Connect with shortcuts (Kuffner and LaValle 2000).
 """
 
 import hashlib
@@ -20,8 +20,7 @@ from kinarm.randomness import low_discrepancy_points
 from kinarm.simulator import Simulator
 
 SAMPLES, VIAS = (8, 48, 512), 128
-"""Configurations from which goals are sought in turn, and motions by way of another one, for each
-number of steps."""
+"""Configurations to seek goals from, in turn, and motions by way of others, per number of steps."""
 
 DETOURS = 4
 """Detours planned for a trial; the shortest counts."""
@@ -48,8 +47,8 @@ class MotionSearch:
     costs : ndarray, shape (n,)
         Their costs; infinite where there is none.
     solved : ndarray of int, shape (n,)
-        Fewest steps to a contact-free configuration found at the goal, even if no motion leads
-        there; the horizon + 1 without one.
+        Fewest steps to a contact-free configuration at the goal, with or without a motion; the
+        horizon + 1 if none was found.
     """
 
     def __init__(self, simulator: Simulator, starts: Array, goals: Array) -> None:

@@ -18,9 +18,8 @@ from kinarm.policies.ppo.networks import ActorCritic
 class TrainingArms:
     """Arms stepped together, whose episodes are replaced when they end.
 
-    With a mirror, new scenarios with goals on the left are reflected, so that a learner only meets
-    goals on the right. To stop at the goal, a success takes two steps in a row within the
-    tolerance.
+    With a mirror, new goals on the left are reflected, so that a learner only meets those on the
+    right. To stop at the goal, a success takes two steps in a row within the tolerance.
 
     Parameters
     ----------
@@ -155,8 +154,8 @@ def collect(
 ) -> Experience:
     """Step the arms, then judge all steps at once.
 
-    An episode cut short by the time limit would have gone on: its last reward gets the value of its
-    last observation.
+    An episode that the time limit cut short would go on: its last reward gets the value of its last
+    observation.
 
     Parameters
     ----------

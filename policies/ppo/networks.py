@@ -76,7 +76,7 @@ def split_parameters(vector: Vector, widths: Sequence[int]) -> Parameters:
 def initial_parameters(
     rng: np.random.Generator, widths: Sequence[int], log_std: float
 ) -> NDArray[np.float32]:
-    """Draw parameters as Stable-Baselines3: orthogonal weights, zero biases.
+    """Draw orthogonal weights and zero biases, as Stable-Baselines3 does.
 
     Parameters
     ----------
@@ -100,8 +100,8 @@ def initial_parameters(
 def orthogonal(normal: NDArray[np.float64]) -> NDArray[np.float64]:
     """Make columns, or rows if there are fewer, of a matrix orthonormal.
 
-    Of normal numbers it makes a matrix that is as likely as any of its rotations. Sums have a fixed
-    order, which BLAS does not.
+    Of normal numbers it makes any rotation equally likely. Sums have a fixed order, unlike those of
+    BLAS.
     """
     tall = normal.shape[0] >= normal.shape[1]
     found = (normal.T if tall else normal).copy()

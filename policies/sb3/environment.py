@@ -50,8 +50,8 @@ def sb3_vec_env(
     threads : int, optional
         As for `kinarm.Simulator`.
     replay_share, replay_size : float and int
-        Probability that an episode begins where one of the last ``replay_size`` failures did; infos
-        tell which (``replayed``). Evaluate policies without it.
+        Probability that an episode begins where one of the last ``replay_size`` failures did, told
+        by infos (``replayed``). Evaluate policies without it.
     render_mode, width, height, camera
         As for `kinarm.ReachEnv`.
     **overrides

@@ -16,9 +16,9 @@ class HindsightReplayBuffer(HerReplayBuffer):
     """A ``HerReplayBuffer`` that ends an episode where it reaches a substituted goal.
 
     In `kinarm.ReachGoalEnv` reaching the goal ends an episode. The buffer of Stable-Baselines3
-    keeps the end of the original episode, so that a learner would bootstrap a value after the goal,
-    where nothing comes. This buffer also keeps the part of a reward that does not depend on the
-    goal, such as the penalty for a collision, without ``copy_info_dict``.
+    keeps the original end, so that a learner would bootstrap a value after the goal, where nothing
+    comes. This buffer also keeps the part of a reward that does not depend on the goal, such as the
+    penalty for a collision, without ``copy_info_dict``.
     """
 
     def _sample_goals(self, batch_indices: Indices, env_indices: Indices) -> Goals:

@@ -1,10 +1,9 @@
 """How close the tool can come to a goal, and how soon, by branch and bound.
 
-A box of configurations is excluded where a lower bound of the distance exceeds what is asked for,
-and in part cut off. On demand it is excluded, too, if some pair of bodies is proven to overlap
-throughout (`kinarm.policies.oracle.kernels.box_proofs`). A box that is not excluded is tried where
-the linear model of the arm comes closest to the goal, and halved. Boxes are examined side by side,
-in lanes.
+A box of configurations is excluded, or cut, where a lower bound of the distance exceeds what is
+asked for. On demand it is excluded, too, if some pair of bodies is proven to overlap throughout
+(`kinarm.policies.oracle.kernels.box_proofs`). Another box is tried where the linear model of the
+arm comes closest to the goal, and halved. Boxes are examined side by side, in lanes.
 """
 
 import math
@@ -130,9 +129,9 @@ def search(
 ) -> tuple[bool, int, float, float]:
     """Search a box for the configuration with the fewest steps to a goal, or the closest.
 
-    With an infinite resolution, the search is for a configuration close enough to the goal in the
-    fewest steps from the start. Else it is for the closest one, whose distance may exceed what is
-    proven by the resolution.
+    With an infinite resolution, the search is for one close enough to the goal in the fewest steps
+    from the start. Else it is for the closest one, whose distance may exceed what is proven by the
+    resolution.
 
     Parameters
     ----------
