@@ -32,7 +32,7 @@ NEVER = sys.float_info.min
 """A tolerance that nothing meets [m]."""
 
 AIM = 0.005
-"""How close the oracle's motions are to come where success does not end trials [m]."""
+"""How close the oracle aims where success does not end trials [m]."""
 
 
 class Predictor(Protocol):
@@ -58,7 +58,7 @@ class Contestant:
     policy, source : Policy or None, Path or None
         The trained policy, if it is one, and the file that it was read from.
     best_for : tuple of ReachProblem
-        What it was chosen for as the best shipped policy, if it was.
+        What it was chosen for as the best shipped policy.
     """
 
     name: str
@@ -72,13 +72,13 @@ class Contestant:
 
     @property
     def note(self) -> str:
-        """A remark in one line, such as the statistics in use; empty if there is none."""
+        """A remark in one line, such as the statistics in use; may be empty."""
         statistics = self.policy and self.policy.provenance.config.get("vec_normalize")
         return f"{self.name}: observations normalised by {statistics}" if statistics else ""
 
     @property
     def problem(self) -> ReachProblem | None:
-        """The problem that it was trained for, if it was."""
+        """The problem that it was trained for, if any."""
         return self.policy.problem if self.policy else None
 
     def serves(
@@ -89,8 +89,8 @@ class Contestant:
         """Whether it was made for a problem.
 
         What was not trained is for every problem. A policy with a mirror learnt the goals of one
-        side, so it is for each side alone, too. ``change`` makes the changes to the problem that a
-        policy was trained for which make no difference.
+        side, so it is for each side alone, too. ``change`` is made to the problem that the policy
+        was trained for.
         """
         if self.policy is None:
             return True
@@ -100,7 +100,7 @@ class Contestant:
         return trained_for.digest == problem.digest
 
     def check(self, arm: Arm, *, allow_other_arm: bool = False) -> None:
-        """See that the policy, if there is one, fits an arm and was trained for it."""
+        """Check that the policy, if any, fits an arm and was trained for it."""
         if self.policy is None:
             return
         if not allow_other_arm:
@@ -177,7 +177,7 @@ UNTRAINED = {**BASELINES, ORACLE.name: ORACLE}
 
 
 def measure_holding(contestant: Contestant, trials: TrialSet) -> Holding:
-    """Let a contestant face trials that success does not end; the oracle aims at `AIM` there."""
+    """Run trials that success does not end; the oracle aims at `AIM` there."""
     endless = trials.with_tolerance(NEVER)
     if contestant is ORACLE:
         aimed = trials.with_tolerance(min(AIM, trials.problem.task.tolerance))
@@ -201,8 +201,7 @@ def find_contestants(
         ``"best"``, a policy file, a folder of them, a model of Stable-Baselines3 (.zip) or
         ``"module:function"``. A model and a module run code: open only those that you trust.
     problem : ReachProblem, str or Path, optional
-        What a model is for, as its file does not say, or the best shipped policy; others say it
-        themselves.
+        What a model or ``"best"`` is for; others say it themselves.
     """
     text = str(name_or_file)
     if text in UNTRAINED:
@@ -225,7 +224,7 @@ def contestant_of(
     policy: str | Path | Policy | Contestant | PolicyFunction | Predictor,
     problem: ProblemLike | None,
 ) -> Contestant:
-    """Enter a policy: by a name or file, of which a group's first seed; itself; or a function."""
+    """Enter a policy, what a name or file stands for (the first), or a function."""
     if isinstance(policy, Contestant):
         return policy
     if isinstance(policy, Policy):
@@ -254,7 +253,7 @@ def is_import_path(text: str) -> bool:
 
 
 def _imported_contestant(name: str) -> Contestant:
-    """A policy, or what chooses actions, of a module, also of one in the current directory."""
+    """A policy or function of a module, also of one in the current directory."""
     module_name, _, attribute = name.partition(":")
     if str(Path.cwd()) not in sys.path:
         sys.path.insert(0, str(Path.cwd()))
@@ -279,7 +278,7 @@ def _imported_contestant(name: str) -> Contestant:
 
 
 def policy_function(policy: Any, name: str) -> PolicyFunction:
-    """A function of observations, (n, n_observations), or what has a ``predict``, as the first."""
+    """A function of observations, (n, n_observations), from one or from a ``predict``."""
     if inspect.isclass(policy) or not (callable(policy) or hasattr(policy, "predict")):
         raise InvalidInputError(
             f"{name!r} is neither a function of observations nor has a method predict: "

@@ -1,4 +1,4 @@
-"""The document of an evaluation: everything about it, to keep and to face the same trials again."""
+"""The document of an evaluation, to keep and to face the same trials again."""
 
 import json
 from pathlib import Path
@@ -59,7 +59,7 @@ class FacedProblem(Document, frozen=True, kw_only=True):
 
     @classmethod
     def of(cls, trials: TrialSet, bounds: OracleSolutions | None) -> "FacedProblem":
-        """What was faced, with the bounds of the first trials, if they are known."""
+        """What was faced, with the bounds of the first trials, if known."""
         return cls(
             arm=trials.simulator.arm.name,
             problem=trials.problem.pinned.to_json(),
@@ -222,7 +222,7 @@ class EvaluationDocument(Document, frozen=True, kw_only=True):
 
     @classmethod
     def load(cls, path: str | Path) -> "EvaluationDocument":
-        """Read a document; one that is damaged or of another version is refused."""
+        """Read a document; a damaged one or one of another version is refused."""
         with reading(repr(str(path)), "evaluation", InvalidInputError):
             content = json.loads(Path(path).read_bytes())
         try:
@@ -233,7 +233,7 @@ class EvaluationDocument(Document, frozen=True, kw_only=True):
             ) from error
 
     def result(self, policy: str | None, problem: str | None) -> Result:
-        """Find the result of a policy, or of a group's first seed, on a problem."""
+        """The result of a policy, or of a group's first seed, on a problem."""
         fitting = [row for row in self.results if problem in (None, row.problem)]
         if policy is None:
             named = [row for row in fitting if row.trained_on is not None] or fitting
@@ -261,7 +261,7 @@ class EvaluationDocument(Document, frozen=True, kw_only=True):
         return ReachProblem.from_json(self.faced(name).problem, f"problem {name}")
 
     def trials(self, problem: str) -> TrialSet:
-        """The trials of a problem as they were faced, if they and the arm are still the same."""
+        """The trials of a problem as they were faced; refused if their hash differs."""
         faced, simulator = self.faced(problem), Simulator(self.problem(problem))
         starts = finite_array("starts", faced.starts, (None, simulator.arm.n_joints))
         goals = finite_array("goals", faced.goals, (len(starts), 3))

@@ -97,7 +97,7 @@ def check_problem(
     world : World
         The world of the problem.
     trials, seed : int
-        How many trials the oracle faces, and their seed.
+        Number of trials that the oracle faces, and their seed.
     on_progress : callable, optional
         Called with the number of trials solved so far and in all.
     """
@@ -124,7 +124,7 @@ def check_problem(
 
 
 def _goals(trials: TrialSet, on_progress: Progress | None) -> Goals:
-    """Which goals the oracle reaches, and which it proves out of reach within the horizon."""
+    """Which goals the oracle reaches, or proves out of reach within the horizon."""
     solutions = oracle_bounds(trials, on_progress)
     reached = solutions.reachable
     out_of_reach = solutions.steps_lower_bound > trials.problem.task.horizon
@@ -143,7 +143,7 @@ def _goals(trials: TrialSet, on_progress: Progress | None) -> Goals:
 
 
 def random_starts(world: World) -> NDArray[np.float64]:
-    """Configurations that the task may start at, whether something touches or not."""
+    """Configurations that the task may start at, free or not."""
     task, home = world.problem.task, world.arm.home
     if task.starts:
         return np.array(task.starts)

@@ -46,7 +46,7 @@ class BenchmarkRequest(Checked):
     def run(self, command: str | None = None) -> dict[str, Any]:
         """Measure everything, and write ``speed.json`` and ``SPEED.md`` if there is a folder.
 
-        ``command`` is recorded as what made the files; else it is this request.
+        ``command`` is recorded, by default this request.
         """
         from kinarm.evaluation.bench import measure
 

@@ -37,7 +37,7 @@ def _report(request: EvaluationRequest, command: str) -> None:
 
 
 def _footnote(document: "EvaluationDocument") -> str:
-    """Notes on what the figures in the table are of."""
+    """Notes on the figures in the table."""
     from kinarm.evaluation.report.templating import template_environment
     from kinarm.evaluation.table import REPLACED, has_star, table_rows
 

@@ -26,12 +26,12 @@ LEARNING_LEVELS = (
     *((0.1, 0.25), (0.1, 0.5)),
     *((0.05, 0.25), (0.05, 0.5)),
 )
-"""Distances [m] and shares of trials by which the speed of learning is measured."""
+"""Distances [m] and shares of trials that measure the speed of learning."""
 
 
 @dataclass(frozen=True)
 class ClaimPart:
-    """A statistic, named with its unit, that a claim puts on one side of a threshold."""
+    """A statistic that a claim puts on one side of a threshold."""
 
     measure: str
     estimate: Estimate
@@ -59,9 +59,9 @@ class Claim:
     statement : str
         The finding.
     parts : tuple of ClaimPart
-        Its meaning in numbers; all have to be so.
+        Its meaning in numbers; all parts have to hold.
     judged : bool
-        Whether the trainings are such that it can be judged.
+        Whether the trainings are long enough to judge it.
     """
 
     name: str
@@ -158,9 +158,9 @@ def bench_shares(near: NDArray[np.bool_], left: NDArray[np.bool_]) -> tuple[Esti
     """Share of hits on the better and on the worse bench of every seed's policy.
 
     Whether a trial hit, shape (n_seeds, n_trials), and its goal lies on the left, (n_trials,).
-    Which bench is the better one is told by one half of the trials and measured on the other, and
-    the other way round: picking the larger of two noisy shares would flatter it. Where a bench has
-    no trials in one of the halves, there is nothing to tell.
+    One half of the trials tells which bench is better and the other measures it, and the other way
+    round: picking the larger of two noisy shares would flatter it. Unknown where a bench has no
+    trials in one of the halves.
     """
     half = np.arange(near.shape[1]) % 2 == 0
     groups = [[part & bench for bench in (left, ~left)] for part in (half, ~half)]
@@ -222,8 +222,7 @@ def _low_rate_is_worse(results: PaperResults) -> Claim:
 def _many_perturbations_are_worse(results: PaperResults) -> tuple[Claim, Claim]:
     """Section 3.3: too many perturbations may not be desirable.
 
-    Judged twice: after as many iterations, and after as many environment steps, of which more
-    perturbations take more.
+    Judged after as many iterations, and after as many environment steps.
     """
     sweep = results.sweep()
     most = max(perturbations for _, perturbations in sweep)
@@ -245,7 +244,7 @@ def _many_perturbations_are_worse(results: PaperResults) -> tuple[Claim, Claim]:
 
 
 def _difference(measure: str, groups: Sequence[tuple[bool, NDArray[Any]]]) -> ClaimPart:
-    """Mean of the chosen groups of trainings, less that of the others, claimed to be above zero."""
+    """Mean of the chosen groups of trainings, less that of the others, claimed above zero."""
     n = sum(chosen for chosen, _ in groups)
     terms = [(1.0 / n if chosen else -1.0 / (len(groups) - n), values) for chosen, values in groups]
     return ClaimPart(measure, contrast(terms), "above", 0.0)

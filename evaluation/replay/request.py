@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from kinarm.viewer import ReplayPage
 
 ALTERNATIVES = (("policy", "compare"), ("trial", "worst", "collisions", "failures"))
-"""Fields of which one at most can be given."""
+"""Fields that exclude each other."""
 
 NOT_LIVE = (
     *("source", "compare", "trial", "worst", "collisions", "failures", "trials", "out", "record"),
@@ -143,9 +143,9 @@ class ReplayRequest(ProblemOptions):
         return ["a file" if item.name == "source" else option_name(item) for item in given]
 
     def run(self, report: Callable[[str], object] = lambda _: None) -> "ReplayPage | None":
-        """Write the page, and the recordings if that is asked for, and return it.
+        """Write the page, and the recordings if asked for, and return it.
 
-        Or serve the live page until this is interrupted.
+        Or serve the live page until interrupted.
 
         Parameters
         ----------
@@ -230,7 +230,7 @@ class ReplayRequest(ProblemOptions):
 
 
 def normalization_note(recording: "Recording") -> str:
-    """Which file normalised what a policy saw, in a line; empty if none did."""
+    """Which statistics normalised what a policy saw, in a line; empty without them."""
     policy = recording.provenance.get("policy") or {}
     statistics = policy.get("config", {}).get("vec_normalize")
     return f"{recording.policy}: observations normalised by {statistics}" if statistics else ""

@@ -1,4 +1,4 @@
-"""The card of a policy: what one publishes beside its file."""
+"""The card of a policy, to publish beside its file."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -48,7 +48,7 @@ def check_card(
 
 
 def write_card(path: Path, document: EvaluationDocument, evaluations: Sequence[Evaluation]) -> None:
-    """Write a card, and the policy and a replay beside it, with the same name.
+    """Write a card, with the policy and a replay beside it.
 
     Parameters
     ----------
