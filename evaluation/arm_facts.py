@@ -16,7 +16,7 @@ from kinarm.scene import Scene
 
 
 def contact_on_bare_ground(arm: Arm) -> ContactModel:
-    """The pairs of bodies that are tested for contact where only the arm stands."""
+    """The pairs of bodies tested for contact where only the arm stands."""
     return ContactModel.build(arm, Scene(obstacles=(), goal_regions=()))
 
 

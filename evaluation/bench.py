@@ -30,7 +30,7 @@ from kinarm.simulator import Simulator
 
 BATCHES = (48, 512, 4096)
 HEADLINE_BATCH = 512
-"""Batch whose trained rollouts on all threads are compared with the reference path."""
+"""Batch that is compared with the reference path, trained and on all threads."""
 SLOW_REPETITIONS = 3
 """Most repetitions of what takes seconds."""
 REFERENCE_TRIALS, ORACLE_TRIALS = 24, 200
@@ -38,7 +38,7 @@ VECTOR_ENVS, VECTOR_STEPS, SINGLE_STEPS = 64, 200, 2000
 
 
 def timed(run: Callable[[], int], repetitions: int) -> dict[str, float]:
-    """Median and best rate [1/s] of a function that returns its steps, after a first run."""
+    """Median and best rate [1/s] of what returns its steps, after a first run."""
     run()
     rates = []
     for _ in range(repetitions):
@@ -56,7 +56,7 @@ def measure(policy_name: str, repetitions: int, *, ppo: bool = False) -> dict[st
     policy_name : str
         Trained policy to run, on the problem that it is for.
     repetitions, ppo : int, bool
-        How often each figure is measured, and whether to time a training with PPO as well.
+        How often to measure, and whether to time a training with PPO.
     """
     policy = load_policy(policy_name)
     problem = policy.problem
@@ -91,7 +91,7 @@ def measure(policy_name: str, repetitions: int, *, ppo: bool = False) -> dict[st
 def measure_rollouts(
     simulator: Simulator, policy: Policy, batch: int, repetitions: int
 ) -> list[dict[str, Any]]:
-    """Steps per second of whole episodes: random and trained, on one and on all threads.
+    """Steps per second of episodes: random and trained, on one and all threads.
 
     Parameters
     ----------
@@ -121,7 +121,7 @@ def measure_rollouts(
 
 
 def reference_steps(simulator: Simulator, policy: Policy) -> int:
-    """Steps of some episodes on the slow reference path, with Pinocchio and Coal."""
+    """Steps of some episodes on the slow reference path."""
     reference = ReferenceSimulator(simulator)
     starts, goals = simulator.sample(np.random.default_rng(0), REFERENCE_TRIALS)
     episodes = [reference.rollout(policy, *pair) for pair in zip(starts, goals, strict=True)]
@@ -131,7 +131,7 @@ def reference_steps(simulator: Simulator, policy: Policy) -> int:
 def measure_env(
     env: ReachEnv | ReachVectorEnv, shape: tuple[int, ...], repetitions: int
 ) -> dict[str, float]:
-    """Steps per second of all arms of an environment without wrappers, on random actions.
+    """Steps per second of all arms of an environment, on random actions.
 
     Parameters
     ----------
@@ -189,7 +189,7 @@ run = [sys.executable, "-P", "-m", *sys.argv[1:]]
 subprocess.run(run, stdout=subprocess.DEVNULL, check=True)
 print(resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss)
 """
-"""A small process in between, because the peak memory of a process counts its parent's."""
+"""A small process in between: peak memory counts that of the parent."""
 
 
 def measure_evaluation() -> dict[str, float]:

@@ -29,7 +29,7 @@ ARCHIVE = ("bounds", 1)
 """Kind and version of the files."""
 
 MOST_BOUNDED = 2000
-"""Most trials that are bounded, the first ones, even if policies face more.
+"""Most trials that are bounded beside policies that face more, the first ones.
 
 A proof takes a thousand times as long as a policy's trial.
 """
@@ -38,18 +38,18 @@ _known: WeakKeyDictionary[TrialSet, OracleSolutions] = WeakKeyDictionary()
 
 
 def oracle_bounds(trials: TrialSet, on_progress: Progress | None = None) -> OracleSolutions:
-    """Look up what the oracle knows about a set of trials, or solve and keep it.
+    """Look up what the oracle knows about trials, or solve and keep it.
 
     Solutions are kept in the cache folder, under the hash of the trials and of the oracle's
-    version, and in memory as long as the trials are. A file that cannot be read is replaced; where
-    none can be written, nothing is kept. Beyond ``KEPT_BYTES``, what was used least recently goes.
+    version, and in memory as long as the trials are. An unreadable file is replaced; where none can
+    be written, nothing is kept. Beyond ``KEPT_BYTES``, what was used least recently goes.
 
     Parameters
     ----------
     trials : TrialSet
         The trials.
     on_progress : callable, optional
-        Called with the number of trials solved so far and in all, unless known.
+        Called with the number of trials solved so far and in all, unless they are known.
     """
     if trials not in _known:
         path = cache_folder() / f"oracle-{trials.digest}-{oracle_version()}.npz"
@@ -82,7 +82,7 @@ def _load(path: Path) -> OracleSolutions | None:
 
 
 def _save(path: Path, solutions: OracleSolutions) -> None:
-    """Write solutions, if possible, and delete what was used least recently."""
+    """Write solutions, if possible, and delete the least recently used."""
     with suppress(OutputError, OSError):
         check_folder(path.parent)
         save_archive(path, *ARCHIVE, vars(solutions), {}, compress=True)
@@ -107,7 +107,7 @@ class TrialBounds(Document, frozen=True, kw_only=True):
     Parameters
     ----------
     steps, steps_lower_bound : list of int
-        Steps of the motion that was found, and those that are proven to be necessary.
+        Steps of the motion that was found, and steps proven necessary.
     final_distance, distance_lower_bound : list of float
         How close the motion comes, and no motion within the horizon comes closer [m].
     """

@@ -1,4 +1,4 @@
-"""Who takes part in an evaluation: trained policies and baselines."""
+"""Contestants of an evaluation: trained policies and baselines."""
 
 import inspect
 import re
@@ -36,27 +36,27 @@ AIM = 0.005
 
 
 class Predictor(Protocol):
-    """Something that chooses actions as models of Stable-Baselines3 do."""
+    """What chooses actions as models of Stable-Baselines3 do."""
 
     @property
     def predict(self) -> Callable[..., Any]:
-        """From observations, shape (n, n_observations), to actions, or to actions and a state."""
+        """From observations, (n, n_observations), to actions, perhaps with a state."""
 
 
 @dataclass(frozen=True, eq=False)
 class Contestant:
-    """Something that can be put to the trials.
+    """Something that can face trials.
 
     Attributes
     ----------
     name : str
         Name in tables.
     run : callable
-        Runs all trials of a set; with ``record``, it keeps the configurations visited.
+        Runs a set of trials; with ``record``, it keeps the configurations visited.
     algorithm, recipe, seed : str, str, int or None
         How it was made, and its training seed.
     policy, source : Policy or None, Path or None
-        The trained policy, if it is one, and the file that it was read from.
+        The trained policy, if it is one, and its file.
     best_for : tuple of ReachProblem
         What it was chosen for as the best shipped policy.
     """
@@ -88,9 +88,8 @@ class Contestant:
     ) -> bool:
         """Whether it was made for a problem.
 
-        What was not trained is for every problem. A policy with a mirror learnt the goals of one
-        side, so it is for each side alone, too. ``change`` is made to the problem that the policy
-        was trained for.
+        What was not trained is for every problem. A policy with a mirror learnt one side, so it is
+        for each side alone, too. ``change`` is made to the problem that it was trained for.
         """
         if self.policy is None:
             return True
@@ -199,7 +198,7 @@ def find_contestants(
     name_or_file : str or Path
         A baseline, ``"oracle"``, a shipped policy, a group of them (all training seeds),
         ``"best"``, a policy file, a folder of them, a model of Stable-Baselines3 (.zip) or
-        ``"module:function"``. A model and a module run code: open only those that you trust.
+        ``"module:function"``. Models and modules run code: open only those that you trust.
     problem : ReachProblem, str or Path, optional
         What a model or ``"best"`` is for; others say it themselves.
     """
@@ -224,7 +223,7 @@ def contestant_of(
     policy: str | Path | Policy | Contestant | PolicyFunction | Predictor,
     problem: ProblemLike | None,
 ) -> Contestant:
-    """Enter a policy, what a name or file stands for (the first), or a function."""
+    """Enter a policy, the first of a name or file, or a function."""
     if isinstance(policy, Contestant):
         return policy
     if isinstance(policy, Policy):
@@ -239,7 +238,7 @@ def contestant_of(
 
 
 def _model_contestant(path: Path, problem: ProblemLike | None) -> Contestant:
-    """A model of Stable-Baselines3, with the statistics that lie beside it."""
+    """A model of Stable-Baselines3, with the statistics beside it."""
     try:
         policy = Policy.from_sb3(path, problem, find_vec_normalize(path))
     except InvalidInputError as error:
@@ -253,7 +252,7 @@ def is_import_path(text: str) -> bool:
 
 
 def _imported_contestant(name: str) -> Contestant:
-    """A policy or function of a module, also of one in the current directory."""
+    """A policy or function of a module, perhaps in the current directory."""
     module_name, _, attribute = name.partition(":")
     if str(Path.cwd()) not in sys.path:
         sys.path.insert(0, str(Path.cwd()))
@@ -278,7 +277,7 @@ def _imported_contestant(name: str) -> Contestant:
 
 
 def policy_function(policy: Any, name: str) -> PolicyFunction:
-    """A function of observations, (n, n_observations), from one or from a ``predict``."""
+    """The function of observations, (n, n_observations), itself or as ``predict``."""
     if inspect.isclass(policy) or not (callable(policy) or hasattr(policy, "predict")):
         raise InvalidInputError(
             f"{name!r} is neither a function of observations nor has a method predict: "

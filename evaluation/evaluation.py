@@ -43,8 +43,8 @@ from kinarm.simulator import PolicyFunction
 class Evaluation:
     """How one policy did on one problem: ``rollouts`` of ``trials``.
 
-    ``bounds`` are what any policy could do in the trials, or in the first ones; ``holding`` is
-    what this one did where success did not end them. Both are optional.
+    ``bounds``, if known, are what any policy could do in the trials, or in the first ones;
+    ``holding``, if known, is what this one did where success did not end them.
     """
 
     contestant: Contestant
@@ -84,7 +84,7 @@ class Evaluation:
 
     @property
     def step_ratio(self) -> NDArray[np.float64]:
-        """Steps taken over those proven necessary, of the trials that succeeded."""
+        """Steps taken over those proven necessary, of successful trials."""
         return _outcomes((self,)).step_ratio
 
     @property
@@ -143,7 +143,7 @@ class PooledEvaluation:
 
     @cached_property
     def metrics(self) -> dict[str, Estimate]:
-        """Figures of merit over all seeds; intervals are about other trainings and trials."""
+        """Figures of merit over all seeds; intervals are over seeds and trials."""
         return estimate_metrics(_outcomes(self.members))
 
     @property
@@ -201,7 +201,7 @@ def _outcomes(members: Sequence[Evaluation]) -> Outcomes:
 
 
 def _row(name: str, evaluations: Sequence[Evaluation]) -> dict[str, Any]:
-    """Fields of a row: what it is about, and why trials failed, most frequent first."""
+    """Fields of a row, with causes of failure, the most frequent first."""
     contestant, trials = evaluations[0].contestant, evaluations[0].trials
     causes = (
         failure_causes(each.outcomes, each.rollouts.steps.tolist(), each.contacts)
@@ -244,8 +244,8 @@ def evaluate(
     ----------
     policy : str, Path, Policy, Contestant, function or predictor
         A name or file as for `find_contestants` (of a group, the first seed); a policy; a function
-        from observations (n, n_observations) to actions (n, n_actions); or an object with a method
-        ``predict`` as in Stable-Baselines3.
+        from observations (n, n_observations) to actions (n, n_actions); or what has a ``predict``
+        as in Stable-Baselines3.
     problem : ReachProblem, str or Path, optional
         The problem; by default the one that the policy was trained for.
     trials, seed : int
@@ -313,12 +313,12 @@ def pool(evaluations: Sequence[Evaluation]) -> tuple[PooledEvaluation, ...]:
 
 
 def evaluation_document(evaluations: Sequence[Evaluation], command: str) -> EvaluationDocument:
-    """Everything about an evaluation, to be written and read again.
+    """Everything about an evaluation, to write and read again.
 
     Parameters
     ----------
     evaluations : sequence of Evaluation
-        One trial set per problem; names of policies and of problems are distinct.
+        One trial set per problem; policies and problems have distinct names.
     command : str
         The command that made them.
     """

@@ -53,7 +53,7 @@ def distance_histograms(evaluations: Sequence[Evaluation]) -> "Figure":
 def panels_figure(
     size: tuple[float, float], rows: int, columns: int, **options: Any
 ) -> "tuple[Figure, NDArray[Any]]":
-    """A figure and its panels, shape (rows, columns), without top and right spines.
+    """A figure and its panels, shape (rows, columns), with left and bottom spines.
 
     Parameters
     ----------
@@ -78,7 +78,7 @@ def _stairs(
     label: str,
     number: int,
 ) -> None:
-    """Draw the histogram of each training seed faintly and their mean boldly."""
+    """Draw the histograms of the seeds faintly and their mean boldly."""
     colour, dash = COLOURS[number % len(COLOURS)], DASHES[number // len(COLOURS) % len(DASHES)]
     shares = np.array([np.histogram(d, edges)[0] / len(d) for d in distances])
     for share in shares if len(shares) > 1 else ():
@@ -87,7 +87,7 @@ def _stairs(
 
 
 def series_labels(evaluations: Sequence[Evaluation]) -> list[str]:
-    """Name of the group of each evaluation, and its training problem if it is another one.
+    """Name of each evaluation's group, with its training problem if different.
 
     A symmetric policy for several goal regions has one name on all problems that it is for.
     """

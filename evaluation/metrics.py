@@ -19,10 +19,10 @@ LIMITS = (0.1, 0.2)
 """Distances whose shares are reported beside success [m]."""
 
 CLOSE = (0.02, 0.01, 0.005)
-"""Distances whose shares are reported where success does not end a trial [m]."""
+"""Distances whose shares are reported if success does not end trials [m]."""
 
 HOLDING_WITHIN = 0.01
-"""A goal counts as held if the tool stays within this distance to the end [m]."""
+"""Distance within which the tool stays to the end if a goal is held [m]."""
 
 ALWAYS = float("inf")
 """Priority of columns that are never left out."""
@@ -30,27 +30,27 @@ ALWAYS = float("inf")
 
 @dataclass(frozen=True, kw_only=True)
 class Metric:
-    """A figure of merit: its meaning, its formula and how tables show it.
+    """A figure of merit: meaning, formula and how tables show it.
 
     Attributes
     ----------
     meaning, definition : str
-        What it is, and its mathematical formula, in the letters of the documentation.
+        What it is, and its mathematical formula, with the letters of the documentation.
     formula : callable
-        From `Outcomes` to the figure; None or NaN if unknown. For an interval it gets many
-        resamples at once and works along the last axis.
+        From `Outcomes` to the figure; None or NaN if unknown. For intervals it works along the
+        last axis of many resamples.
     unit : str
-        ``"%"`` for shares, which are kept as fractions and shown in per cent.
+        ``"%"`` for shares, kept as fractions and shown in per cent.
     interval : ``"Wilson"``, ``"bootstrap"`` or None
         How its 95 % interval is made. Wilson's is for shares of trials; the formula also gets
         each trial by itself.
     needs_bounds, needs_holding : bool
-        Whether it compares with the oracle, or is about trials that go on after success.
+        Whether it needs the oracle, or trials that go on after success.
     heading, spread_heading : str
-        Headings of its column, and of one for its range over training seeds; without a heading it
-        is in documents alone.
+        Headings of its column, and of its range over training seeds; without one it is in
+        documents alone.
     digits, shows_interval : int, bool
-        Decimals that are shown, and whether the interval is.
+        Decimals, and whether the interval is shown.
     beside : tuple of str, optional
         Another metric in the same column, and how it is shown, such as ``"{} s"``.
     priority : float

@@ -1,4 +1,4 @@
-"""How trials of one or several training seeds ended, and why they failed."""
+"""How trials ended, and why they failed."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -32,8 +32,8 @@ class Holding:
     closest : ndarray, shape (n,)
         Smallest distance of the tool from the goal after any step [m].
     farthest_at_end : ndarray, shape (n,)
-        Largest distance after the last `HOLDING_STEPS` steps, or all if there are fewer [m];
-        infinite where contact ended the trial.
+        Largest distance after the last `HOLDING_STEPS` steps, or all if fewer [m]; infinite where
+        contact ended the trial.
     collision, steps : ndarray, shape (n,)
         Whether contact ended the trial, and steps taken.
     """
@@ -82,15 +82,15 @@ class Outcomes:
     Attributes
     ----------
     rollouts : tuple of Rollouts
-        One per training seed, or what has the same columns, but for configurations.
+        One per training seed, or what has the same columns without configurations.
     bounds : OracleSolutions or None
         What any policy could do in the trials, or in the first ones, if known.
     holding : tuple of Holding
-        What they did where success did not end the trials, if known.
+        What they did without an end at success, if known.
     time_step : float
         Duration of a step [s].
     numbers : ndarray of int, shape (..., n_trials), optional
-        Resampled trials; by default each of them once.
+        Resampled trials; each once by default.
     """
 
     rollouts: tuple[Any, ...]
@@ -136,7 +136,7 @@ class Outcomes:
 
     @cached_property
     def step_ratio(self) -> NDArray[np.float64]:
-        """Steps over those proven necessary, of bounded trials that succeeded, one axis."""
+        """Steps over those proven necessary, of successful bounded trials, one axis."""
         necessary = self._known_bounds.steps_lower_bound
         bounded = slice(len(necessary))
         ratios = [

@@ -21,7 +21,7 @@ Pair = tuple[Contestant, ReachProblem]
 """Who faces what."""
 
 VARYING = ("seed", "vec_normalize")
-"""Settings that differ between the training seeds of a recipe."""
+"""Settings that differ between training seeds."""
 
 
 def select_pairs(request: "EvaluationRequest") -> list[Pair]:
@@ -96,7 +96,7 @@ def _named_contestants(request: "EvaluationRequest", named: list[ReachProblem]) 
 
 
 def _problems(request: "EvaluationRequest", chosen: list[Contestant]) -> list[ReachProblem]:
-    """Problems that contestants were trained or chosen for, or all; the paper's first."""
+    """Problems of the contestants, or all; the paper's come first."""
     own: dict[str, ReachProblem] = {}
     for each in chosen:
         trained = [_changed(request, each.problem)] if each.problem else []
@@ -130,10 +130,10 @@ def check_names(pairs: Iterable[Pair]) -> None:
 
 
 def group_names(contestants: Iterable[Contestant]) -> dict[str, str]:
-    """Name of the group of training seeds of each contestant, by its own name.
+    """Name of each contestant's group of training seeds, by its own name.
 
-    Seeds belong together that have the same learner, settings and problem. Where a seed occurs
-    twice, shipped policies, and those of each folder, are apart from others.
+    Seeds of a group share learner, settings and problem. If a seed occurs twice, shipped policies,
+    and those of each folder, are apart.
 
     Parameters
     ----------
@@ -156,7 +156,7 @@ def group_names(contestants: Iterable[Contestant]) -> dict[str, str]:
 
 
 def _training(contestant: Contestant) -> Hashable:
-    """A key that all seeds of a recipe share; the name if it is no such seed."""
+    """A key that all seeds of a recipe share, or the name."""
     if contestant.policy is None or contestant.seed is None:
         return contestant.name
     made = contestant.policy.provenance
@@ -177,7 +177,7 @@ SPLIT_BY: tuple[Callable[[Contestant], Hashable], ...] = (
 
 
 def _with_distinct_seeds(members: list[Contestant], depth: int = 0) -> list[list[Contestant]]:
-    """Split a group that holds a seed twice: by being shipped, by folder, one by one."""
+    """Split a group with a seed twice: by being shipped, by folder, one by one."""
     if len({member.seed for member in members}) == len(members):
         return [members]
     parts: dict[Hashable, list[Contestant]] = {}

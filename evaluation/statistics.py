@@ -1,6 +1,6 @@
-"""Estimates with 95 % intervals, of the figures of merit and of contrasts.
+"""Figures of merit and contrasts with their 95 % intervals.
 
-They are written out, because SciPy's statistics take longer to load than a policy to evaluate.
+They are written out, because SciPy's take longer to load than a policy to evaluate.
 """
 
 import math
@@ -58,7 +58,7 @@ class Estimate:
 
 
 def estimate_metrics(outcomes: Outcomes) -> dict[str, Estimate]:
-    """Compute all `METRICS`, with their intervals; unknown figures stay empty.
+    """Compute all `METRICS` with intervals; unknown figures stay empty.
 
     Intervals are about other trials, and with several training seeds also about other trainings.
     """
@@ -124,8 +124,8 @@ def wilson_interval(hits: int, trials: int, seeds: int = 1) -> Interval:
     hits, trials : int
         Hits of all seeds together, and the trials that every seed faced.
     seeds : int
-        Number of training seeds. They face the same trials, so they are no independent evidence:
-        the interval is that of the trials of one, widened to whole hits.
+        Number of training seeds. They face the same trials and are no independent evidence: the
+        interval is that of the trials of one, widened to whole hits.
     """
 
     def end(hits: int, side: int) -> float:
@@ -151,7 +151,7 @@ def resamples(trials: int) -> Iterable[NDArray[np.int64]]:
 
 @lru_cache(maxsize=1)
 def _kept(trials: int) -> tuple[NDArray[np.int64], ...]:
-    """Resamples in one piece, kept for the next policy with as many trials."""
+    """A single piece, kept for the next policy with as many trials."""
     return tuple(_drawn(trials))
 
 
@@ -179,11 +179,10 @@ def estimate_text(estimate: Estimate) -> str:
 def contrast(terms: Sequence[tuple[float, NDArray[np.float64]]]) -> Estimate:
     """Weighted sum of means over seeds and trials: of weights, and values (n_seeds, n_trials).
 
-    Seeds and trials are crossed random effects: all seeds of a recipe face the same trials, and so
-    may several recipes, also on tasks whose trials differ in the bench only. The variance is that
-    of the seeds' means, in each term, plus that of the trials' weighted means. Both contain the
-    interaction of seed and trial, so the interval is rather too wide. It is Student's, with the
-    degrees of freedom of Welch and Satterthwaite.
+    Seeds and trials are crossed random effects: all seeds, and perhaps several recipes and tasks,
+    face the same trials. The variance is that of the seeds' means, in each term, plus that of the
+    trials' weighted means. Both contain the interaction of seed and trial, so the interval is
+    rather too wide. It is Student's, with the degrees of freedom of Welch and Satterthwaite.
     """
     value = sum(weight * float(values.mean()) for weight, values in terms)
     parts = [
@@ -231,7 +230,7 @@ def mean_share(shares: NDArray[np.float64], n_trials: int) -> Estimate:
 def share_over_seeds(hits: NDArray[Any]) -> Estimate:
     """A share of trials and its 95 % interval.
 
-    That of one seed is Wilson's. That of several covers it and the interval over seeds and trials
+    That of one seed is Wilson's. That of several covers Wilson's and the one over seeds and trials
     (`contrast`), which says nothing where all seeds agree. Hits, shape (n_seeds, n_trials), may be
     shares of several trainings as well.
     """

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from rich.table import Table
 
 SPREAD_PRIORITY = 5
-"""Priority of the columns with ranges over training seeds; see `Metric.priority`."""
+"""`Metric.priority` of columns with ranges over training seeds."""
 
 REPLACED = "* some settings of the recipe are replaced"
 """Meaning of the star in a label."""
@@ -56,7 +56,7 @@ def metric_columns() -> list[Column]:
 
 
 def telling_columns(rows: Sequence[Row], priority: float = 0) -> list[Column]:
-    """Metric columns of at least some priority that say something about rows."""
+    """Metric columns of some priority that say something about rows."""
     columns = (column for column in metric_columns() if column.priority >= priority)
     return [column for column in columns if any(column.cell(row).value for row in rows)]
 
@@ -84,7 +84,7 @@ def spread_cell(name: str, row: Row) -> Cell:
 
 
 def policy_label(row: Row) -> str:
-    """Name of a row's policy, with the star of replaced settings after the recipe.
+    """Name of a row's policy, with the star of replaced settings.
 
     Names of files lack the star: ``ars-tuned-right`` is ``ars-tuned*-right``.
     """
@@ -93,7 +93,7 @@ def policy_label(row: Row) -> str:
 
 
 def has_star(row: Row) -> bool:
-    """Whether the label of a row says that settings of the recipe are replaced."""
+    """Whether the label of a row has the star of replaced settings."""
     return row.recipe.endswith("*") and row.recipe in policy_label(row)
 
 
@@ -107,8 +107,7 @@ def print_table(
     document, console : EvaluationDocument, Console
         What to print, and where.
     markdown : bool
-        As Markdown with all columns; else those of low priority are left out where space is
-        scarce.
+        As Markdown with all columns; else some are left out where space is scarce.
     """
     rows = [row for problem in document.protocol.problems for row in table_rows(document, problem)]
     columns = [
@@ -135,7 +134,7 @@ def print_table(
 def _evaluation_table(
     document: EvaluationDocument, columns: Sequence[Column], *, markdown: bool = False
 ) -> "Table":
-    """The figures of a document as a table; several training seeds share a row."""
+    """The table of a document; several training seeds share a row."""
     from rich import box
     from rich.table import Table
 

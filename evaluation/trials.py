@@ -19,7 +19,7 @@ LOT = 4096
 
 
 def trial_generator(seed: int, trial: int, stream: int = 0) -> np.random.Generator:
-    """Random generator of one trial, independent of all others.
+    """Random generator of one trial, independent of others.
 
     Parameters
     ----------
@@ -35,7 +35,7 @@ def trial_generator(seed: int, trial: int, stream: int = 0) -> np.random.Generat
 class TrialSet:
     """Starts and goals, a function of the problem and a seed alone.
 
-    The first n trials of a set are the same for every size of the set.
+    The first trials of a set are the same for every size.
 
     Attributes
     ----------

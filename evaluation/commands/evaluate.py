@@ -1,4 +1,4 @@
-"""``kinarm-eval``: evaluate policies on random reaching trials, beside an oracle."""
+"""``kinarm-eval``: evaluate policies on random trials, beside an oracle."""
 
 import json
 from functools import partial
@@ -43,15 +43,12 @@ def _footnote(document: "EvaluationDocument") -> str:
 
     protocol = document.protocol
     rows = (row for name in protocol.problems for row in table_rows(document, name))
-    text = (
-        template_environment()
-        .get_template("footnote.txt")
-        .render(
-            protocol=protocol,
-            results=document.results,
-            starred=any(map(has_star, rows)),
-            replaced=REPLACED,
-        )
+    template = template_environment().get_template("footnote.txt")
+    text = template.render(
+        protocol=protocol,
+        results=document.results,
+        starred=any(map(has_star, rows)),
+        replaced=REPLACED,
     )
     return text.rstrip()
 

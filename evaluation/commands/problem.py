@@ -101,7 +101,7 @@ class CheckRequest(ShowRequest):
 
 
 def write_picture(path: Path, problem: ReachProblem) -> None:
-    """Write a picture of the arm at home, and a goal in the middle of a region."""
+    """Write a picture of the arm at home, with a goal in mid-region."""
     from matplotlib.image import imsave
 
     from kinarm.viewer import Renderer

@@ -1,4 +1,4 @@
-"""``kinarm-reproduce``: train what the paper trained, and see which of its claims hold."""
+"""``kinarm-reproduce``: train what the paper trained, and judge its claims."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace

@@ -71,7 +71,7 @@ class RunningOptions(Checked):
                 raise InvalidInputError(f"--{name} goes with --slurm")
 
     def executor(self, folder: Path, threads: int = 1) -> "Executor":
-        """Where trainings run, on so many threads each; Slurm's jobs lie in the folder."""
+        """Where trainings run; Slurm's jobs lie in the folder."""
         from kinarm.evaluation.experiments.clusters import RayExecutor, SlurmExecutor
         from kinarm.evaluation.experiments.executors import LocalExecutor
 

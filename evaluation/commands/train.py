@@ -23,10 +23,9 @@ if TYPE_CHECKING:
 PROG = "kinarm-train"
 
 CIRCUMSTANCES = ("problem", "seed", "recipe", "algorithm")
-"""Settings that are fields of a `TrainRequest`, or that the learner determines."""
+"""Settings with a field of `TrainRequest`, or determined by the learner."""
 
 SETTINGS = "settings of the learner (defaults of the recipe {})"
-
 
 MOST_SEEDS = 1000
 
@@ -110,7 +109,7 @@ def build_parser(named: str | None = None) -> Parser:
 def _add_learner(
     parsers: "argparse._SubParsersAction[CommandParser]", name: str, learner: Learner[Any, Any]
 ) -> None:
-    """Add the options of every training, and one for each setting of a learner."""
+    """Add the options of every training, and those of a learner's settings."""
     needs = f"\nneeds the extra {learner.extra}: pip install 'kinarm[{learner.extra}]'\n"
     parser = parsers.add_parser(
         name,
@@ -130,15 +129,12 @@ def _epilog(name: str, learner: Learner[Any, Any]) -> str:
     """Recipes of a learner, and examples."""
     recipe = "tuned" if "tuned" in learner.recipes else learner.first_recipe
     lines = (f"  {each:<8} {summary}\n" for each, summary in learner.summaries.items())
-    return (
-        shipped_files("help", ".txt")["learner"]
-        .read_text()
-        .format(
-            name=name,
-            recipes="recipes:\n" + "".join(lines) if learner.summaries else "",
-            recipe=recipe,
-            half=learner.recipes[recipe].iterations // 2,
-        )
+    text = shipped_files("help", ".txt")["learner"].read_text()
+    return text.format(
+        name=name,
+        recipes="recipes:\n" + "".join(lines) if learner.summaries else "",
+        recipe=recipe,
+        half=learner.recipes[recipe].iterations // 2,
     )
 
 

@@ -22,7 +22,7 @@ from kinarm.policies.oracle import ORACLE_SEMANTICS
 from kinarm.policies.provenance import package_versions
 
 PACKAGES = ("kinarm", "kinarm.policies", "kinarm.evaluation", "kinarm.data")
-"""All of kinarm; in a clone they lie beside each other, else in the first."""
+"""All of kinarm; in a clone beside each other, else in the first."""
 
 
 @cache
@@ -40,7 +40,7 @@ def identity() -> dict[str, str]:
 
 
 def do_alike(work: Callable[[Any], Any], expected: Mapping[str, str], task: Any) -> Any:
-    """Do the work for a task if kinarm and its packages are those of the driver.
+    """Do the work for a task if all versions are those of the driver.
 
     Parameters
     ----------
@@ -67,7 +67,7 @@ ANSWER_SECONDS = 10.0
 """How long a cluster may take to answer [s]."""
 
 RETRIES = 20
-"""How often a task is begun anew after its worker or node was lost."""
+"""How often a task is begun anew after its worker was lost."""
 
 AT_ONCE = 10_000
 """Most tasks that wait at a Ray cluster."""
@@ -80,11 +80,10 @@ class RayExecutor:
     Parameters
     ----------
     address : str
-        ``"local"`` for Ray on this machine alone, ``"auto"`` for the cluster in ``RAY_ADDRESS`` or
-        else that of this machine, or an address such as ``"10.0.0.1:6379"`` or
-        ``"ray://head:10001"``.
+        ``"local"`` for this machine alone, ``"auto"`` for the cluster in ``RAY_ADDRESS`` or else
+        that of this machine, or an address such as ``"10.0.0.1:6379"`` or ``"ray://head:10001"``.
     jobs : int, optional
-        Processors of this machine for ``"local"``; all by default. A cluster has its own.
+        Processors of this machine for ``"local"``; all by default.
     threads : int
         Processors that a task takes.
     """
@@ -151,12 +150,12 @@ LOOK_SECONDS = 0.5
 
 @dataclass(frozen=True)
 class SlurmExecutor:
-    """Array jobs of a Slurm cluster, whose machines share the folder with this one.
+    """Array jobs of a Slurm cluster, which shares the folder with this machine.
 
     Parameters
     ----------
     folder : Path
-        Where jobs, their logs and their results lie.
+        Folder of jobs, logs and results.
     bundle : int
         Tasks of one element of the array, one after the other.
     minutes : int

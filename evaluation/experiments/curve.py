@@ -1,4 +1,4 @@
-"""Learning curves: trials that policies face in the course of a training."""
+"""Learning curves: the trials that policies face during a training."""
 
 import time
 from collections.abc import Iterator
@@ -29,10 +29,10 @@ class CurveTrials(Checked):
     Parameters
     ----------
     points : int
-        Most times that a policy faces the trials in the course of its training.
+        Most times that a policy faces the trials during its training.
     spacing : {"even", "geometric"}
-        Spacing of the iterations after which it does; the last is among them, and with geometric
-        spacing the policy before the first iteration as well.
+        Spacing of the iterations after which it does, the last included; with geometric spacing
+        also before the first.
     count, seed : int
         Number and seed of the trials.
     """
@@ -62,12 +62,12 @@ class TrialSettings(Checked):
     seed : int
         Seed of the trials.
     per_decade : int
-        How often a policy faces them while the environment steps of its training grow tenfold; 0
-        for at the end alone.
+        How often a policy faces them while its environment steps grow tenfold; 0 for at the end
+        alone.
     first : int
         Environment steps after which it first faces them.
     curve : CurveTrials, optional
-        Other trials and times for the course of the training.
+        Other trials and times for the learning curves.
     """
 
     count: int = field(default=1000, metadata=TRIALS)
@@ -83,11 +83,11 @@ class CurvePoint(NamedTuple):
     Attributes
     ----------
     iteration, environment_steps : int
-        Iterations that are finished, and steps taken.
+        Finished iterations, and steps taken.
     success, collision : float
         Shares of the trials that ended so.
     median_distance : float
-        Of the final distances [m].
+        Median of the final distances [m].
     """
 
     iteration: int
@@ -115,7 +115,7 @@ class Clock:
     Attributes
     ----------
     seconds, processor_seconds : float
-        Wall time, and time of all processors [s].
+        Wall time and processor time [s].
     points, processor_points : tuple of float
         The same at each point of the learning curve [s].
     """
@@ -128,7 +128,7 @@ class Clock:
 
 @dataclass(frozen=True)
 class Made(Clock):
-    """The clock with the versions of packages and the commit of kinarm's source."""
+    """The clock, the versions of packages and the commit of kinarm's source."""
 
     versions: dict[str, str] = field(default_factory=dict)
     commit: str = ""
@@ -141,11 +141,11 @@ class CurveSoFar:
     Attributes
     ----------
     points : tuple of CurvePoint
-        The policy in the course of the training.
+        The policy during the training.
     distances : ndarray of float32, shape (n_points, n_trials), or empty
         Final distances at the points, if they are kept [m].
     clock : Clock
-        What the training took so far.
+        Time of the training until now.
     """
 
     points: tuple[CurvePoint, ...] = ()
@@ -177,7 +177,7 @@ class Curve:
         simulator.rollout_actions(actions, first.starts, first.goals)  # before any clock runs
 
     def timed(self, states: Iterator[Any]) -> Iterator[Any]:
-        """The states of the training, with the time that they take counted."""
+        """The states of the training; the time that they take is counted."""
         began = time.perf_counter(), time.process_time()
         for state in states:
             self._spent += np.subtract((time.perf_counter(), time.process_time()), began)

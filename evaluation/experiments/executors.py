@@ -1,4 +1,4 @@
-"""Where tasks run: in this process, in worker processes, or on a cluster."""
+"""Where tasks run: this process, worker processes, or a cluster."""
 
 import os
 import pickle
@@ -42,8 +42,8 @@ class Executor(Protocol):
     ) -> Iterator[tuple[Any, Any | Failure]]:
         """Do the work for every task, begun in the given order; yield each task with its result.
 
-        Work, tasks and results can be pickled. What the work raises becomes a `Failure`. Abandoned
-        or interrupted, an executor drops what is not finished.
+        Work, tasks and results can be pickled. What the work raises becomes a `Failure`. An
+        abandoned or interrupted executor drops what is not finished.
 
         Raises
         ------
@@ -55,7 +55,7 @@ class Executor(Protocol):
 def attempt(work: Callable[[Any], Any], task: bytes) -> Any:
     """Do the work for a pickled task; errors are returned as a `Failure`.
 
-    The learner of a task may be in a module of the current directory.
+    Its learner may be in a module of the current directory.
     """
     if str(Path.cwd()) not in sys.path:
         sys.path.append(str(Path.cwd()))
@@ -69,7 +69,7 @@ WATCHED = 0.2
 """How often a worker looks for its parent [s]."""
 
 REPLACED = "A worker stopped while some jobs were given to the executor"
-"""Loky's warning about a worker whose memory has grown: kernels are no leak."""
+"""Loky's warning that a worker's memory has grown: kernels are no leak."""
 
 THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
 """Environment variables for the number of threads of libraries."""

@@ -1,4 +1,4 @@
-"""An experiment: a file that names learners, problems, seeds and what varies."""
+"""An experiment: a file of learners, problems, seeds and what varies."""
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -13,11 +13,10 @@ from kinarm.evaluation.experiments.curve import TrialSettings
 
 MOST_TRAININGS = 100_000
 TRAININGS = {"at_most": MOST_TRAININGS}
-"""Trainings of an experiment at most: all are planned before the first begins."""
+"""Most trainings of an experiment: all are planned before the first begins."""
 
 SEVERAL = ("learners", "recipes", "problems")
-"""Entries of a file that are lists; a text stands for a list of one."""
-
+"""Entries of a file that are lists; a text is a list of one."""
 
 RANGE = ("low", "high", "log")
 
@@ -42,7 +41,7 @@ class Entry(Checked):
     title : str
         Name in tables and figures; what sets it apart by default.
     source : str
-        Where its settings come from, for the record.
+        Where its settings come from.
     learner : str
         Name of the learner.
     recipe : str
@@ -52,7 +51,7 @@ class Entry(Checked):
     seeds, first_seed : int, optional
         Trainings with each setting, and the first seed; those of the experiment by default.
     fixed, grid : dict
-        Values of fields that stay, and lists of values, added to those of the experiment.
+        Fixed values of fields, and lists of values, added to those of the experiment.
     """
 
     name: str = field(default="", metadata=OPTIONAL)
@@ -77,11 +76,11 @@ class Entry(Checked):
 
 @dataclass(frozen=True, kw_only=True)
 class Experiment(Checked):
-    """A set of trainings: every entry, problem, choice and seed with every other.
+    """A set of trainings: all combinations of entries, problems, choices and seeds.
 
-    Fields of settings are named as in a recipe (``step_size``, ``reward.success``), those of a
-    problem by their path (``problem.task.start_spread``, ``problem.arm``). With the name of a
-    learner in front (``ars.step_size``), they concern that learner alone.
+    Fields are named as in a recipe (``step_size``, ``reward.success``), those of a problem by path
+    (``problem.task.start_spread``, ``problem.arm``). With a learner in front (``ars.step_size``),
+    they concern that learner alone.
 
     Parameters
     ----------
@@ -100,13 +99,13 @@ class Experiment(Checked):
     bounds : bool
         Whether to find what any policy could reach in the trials.
     fixed, grid : dict
-        Values of fields that stay, and lists of values, of which all combinations are trained.
+        Fixed values of fields, and lists of values, of which all combinations are trained.
     random : dict
         ``count`` combinations, drawn by ``seed`` (0), of fields with a list of values, or a table
-        of ``low``, ``high`` and, to draw the logarithm evenly, ``log = true``.
+        of ``low``, ``high`` and, for an even logarithm, ``log = true``.
     search : dict
         ``count`` combinations that Optuna proposes, by ``seed`` (0) and ``sampler`` (tpe), of
-        fields as in ``random``; ``pruner`` (median) says which trainings are broken off.
+        fields as in ``random``; ``pruner`` (median) breaks trainings off.
     """
 
     name: str
@@ -198,8 +197,7 @@ class Experiment(Checked):
     def load(cls, name_or_file: str | Path) -> "Experiment":
         """Read a file, or a shipped experiment by its name.
 
-        The experiment is named after its file unless it says otherwise. Paths in it are relative
-        to it.
+        By default it is named after its file. Paths are relative to the file.
 
         Raises
         ------
@@ -217,7 +215,7 @@ class Experiment(Checked):
         problems: Sequence[str] = (),
         seeds: int | None = None,
     ) -> "Experiment":
-        """A part of the experiment, or the same with other problems or seeds.
+        """A part of the experiment, or with other problems or seeds.
 
         Parameters
         ----------
@@ -241,7 +239,7 @@ class Experiment(Checked):
         )
 
     def resolved(self, folder: Path) -> "Experiment":
-        """The same experiment with absolute paths for files in a folder."""
+        """The experiment with absolute paths for files in a folder."""
 
         def found(name: str) -> str:
             beside = folder / name
@@ -273,7 +271,7 @@ def _check_tables(**tables: Mapping[str, Any]) -> None:
 
 
 def _check_values(where: str, entry: Any, *, ranges: bool) -> None:
-    """Refuse what is neither a list of values nor, where allowed, a range."""
+    """Refuse what is neither a list nor, where allowed, a range."""
     if isinstance(entry, list | tuple) or not ranges:
         if not isinstance(entry, list | tuple) or not entry:
             raise InvalidInputError(f"{where} must be a list of at least one value, got {entry!r}")
@@ -296,7 +294,7 @@ def ranges_of(entries: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _prepared(entries: Mapping[str, Any], several: Iterable[str]) -> dict[str, Any]:
-    """Entries of a file, with lists for texts and with nested tables flattened."""
+    """Entries of a file, with lists for texts, and nested tables flattened."""
     made = dict(entries)
     for name in several:
         single = name.removesuffix("s")
@@ -313,7 +311,7 @@ def _prepared(entries: Mapping[str, Any], several: Iterable[str]) -> dict[str, A
 def _flattened(
     entries: Mapping[str, Any], ranges: bool, path: str = ""
 ) -> Iterator[tuple[str, Any]]:
-    """Entries of nested tables by their paths; tables that are ranges may stay whole."""
+    """Entries of nested tables by path; ranges may stay whole."""
     for key, entry in entries.items():
         if isinstance(entry, Mapping) and not (ranges and set(entry) & set(RANGE)):
             yield from _flattened(entry, ranges, f"{path}{key}.")

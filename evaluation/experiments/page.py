@@ -154,10 +154,10 @@ def _by_problem(study: "Study") -> dict[str, list[Group]]:
 
 
 def learning_curves(study: "Study") -> "Figure | None":
-    """Success in the course of the training, against environment steps and wall time.
+    """Success during the training, against environment steps and wall time.
 
-    A row per problem; lines are means over the seeds, bands reach from the worst to the best, and
-    dotted is what the oracle reaches. None if there are no curves.
+    A row per problem; lines are means over the seeds, bands are their ranges, and dotted is what
+    the oracle reaches. None without curves.
     """
     from matplotlib.ticker import NullFormatter
 
@@ -206,8 +206,8 @@ def _draw_curves(panels: "Sequence[Axes]", group: Group, number: int) -> None:
 def effects(study: "Study") -> "Figure | None":
     """Success by the value of each field that varies, a panel per field.
 
-    Shown is the mean over everything else that varies, with its 95 % interval over seeds and
-    trials; for fields drawn from a range, every training. None if nothing varies.
+    Shown are means over everything else that varies, with 95 % intervals over seeds and trials;
+    for fields drawn from a range, all trainings. None if nothing varies.
     """
     fields = {name: runs for name, runs in _by_value(study).items() if len(runs) > 1}
     if not fields:
@@ -226,7 +226,7 @@ def effects(study: "Study") -> "Figure | None":
 
 
 ByValue = dict[str, tuple[Any, list[Run]]]
-"""Values of a field by their text, with the finished trainings that have them."""
+"""Values of a field by their text, with their finished trainings."""
 
 
 def _by_value(study: "Study") -> dict[str, ByValue]:
@@ -264,7 +264,7 @@ def _draw_effect(axes: "Axes", study: "Study", field: str, runs: ByValue) -> Non
 
 
 def _mean_success(study: "Study", runs: Sequence[Run]) -> Estimate:
-    """Mean success of some trainings, and its interval over seeds and trials."""
+    """Mean success, with its interval over seeds and trials."""
     by_seed: dict[int, list[NDArray[np.float64]]] = {}
     for run in runs:
         hits = study.finished[run].outcomes.success.astype(np.float64)
@@ -274,13 +274,13 @@ def _mean_success(study: "Study", runs: Sequence[Run]) -> Estimate:
 
 def _whiskers(estimate: Estimate) -> list[list[float]]:
     """Lengths of the interval below and above the value."""
-    value = float(estimate.value or 0.0)
+    value = estimate.value or 0.0
     low, high = estimate.ci95 or (value, value)
     return [[max(value - low, 0.0)], [max(high - value, 0.0)]]
 
 
 def beside_bound(study: "Study") -> "Figure | None":
-    """Success of each group with its 95 % interval, and what the oracle reaches."""
+    """Success of each group with its 95 % interval, beside the oracle's."""
     problems = {name: groups[:BARS] for name, groups in _by_problem(study).items()}
     if not problems:
         return None
@@ -289,7 +289,7 @@ def beside_bound(study: "Study") -> "Figure | None":
     figure, panels = panels_figure(size, len(problems), 1, height_ratios=heights)
     for (problem, groups), axes in zip(problems.items(), panels.flat, strict=True):
         for row, group in enumerate(groups):
-            share = float(group.success.value or 0)
+            share = group.success.value or 0.0
             axes.barh(row, share, height=0.62, color=COLOURS[0], alpha=0.35)
             whiskers = _whiskers(group.success)
             axes.errorbar(share, row, xerr=whiskers, fmt="|", color=COLOURS[0], capsize=3)

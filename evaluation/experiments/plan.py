@@ -42,7 +42,7 @@ class Run:
     learner : str
         Name of the learner.
     config, plain : TrainingConfig and mapping
-        All of its settings, the arm of the problem pinned; the same as in JSON.
+        Its settings, the arm of the problem pinned; the same as in JSON.
     trials : TrialSettings
         Which trials its policies face.
     choices, entry : mapping and Entry
@@ -78,7 +78,7 @@ class Run:
 
     @cached_property
     def end_key(self) -> str:
-        """Hash of the settings but the iterations, which names the end that others extend."""
+        """Hash without the iterations, which names the file to extend."""
         config = {k: v for k, v in self.settings["config"].items() if k != "iterations"}
         return hash_of({**self.settings, "config": config})
 
@@ -99,14 +99,14 @@ def hash_of(entries: Any) -> str:
 def plan(
     experiment: Experiment, choices: Sequence[Mapping[str, Any]] | None = None
 ) -> tuple[Run, ...]:
-    """All trainings of an experiment, seed by seed, so that the first results cover everything.
+    """All trainings of an experiment, seed by seed: first results cover everything.
 
     Parameters
     ----------
     experiment : Experiment
         What is trained.
     choices : sequence of mappings, optional
-        Values of what varies, by field; those of the experiment by default.
+        Values that vary, by field; those of the experiment by default.
 
     Raises
     ------
@@ -156,7 +156,7 @@ def drawn_choices(experiment: Experiment) -> Iterator[dict[str, Any]]:
 
 
 def _draw(entry: Any, uniform: float) -> Any:
-    """Value of a list or range chosen by a number in [0, 1); whole between whole numbers."""
+    """Value of a list or range for a number in [0, 1); whole between whole ones."""
     if isinstance(entry, list | tuple):
         return entry[int(uniform * len(entry))]
     low, high = entry["low"], entry["high"]
@@ -255,7 +255,7 @@ def changed_problem(problem: ReachProblem, path: str, value: Any) -> ReachProble
     path : str
         Path of the field, such as ``"task.start_spread"`` or ``"scene"``.
     value : object
-        As `ReachProblem.replace` takes it, or as a problem file holds it.
+        As for `ReachProblem.replace`, or as in a problem file.
 
     Raises
     ------

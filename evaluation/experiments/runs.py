@@ -1,4 +1,4 @@
-"""One training of an experiment: how it runs, its results, and its file.
+"""One training of an experiment: its run, its results and its file.
 
 Functions that read a file raise `InvalidInputError` if it is missing, damaged or of another
 training.
@@ -70,9 +70,9 @@ class TrainedRun:
     returns : ndarray, shape (n_iterations,), optional
         Mean returns of each iteration; kept with trials for the curve.
     curve_distance : ndarray of float32, shape (n_points, n_curve_trials), optional
-        Final distances at the points of the curve [m]; kept with trials for the curve.
+        Final distances at its points [m]; kept with trials for the curve.
     clock : Clock
-        How long it took; nothing if unknown.
+        How long it took; empty if unknown.
     """
 
     curve: tuple[CurvePoint, ...]
@@ -84,7 +84,7 @@ class TrainedRun:
 
     @property
     def timed_curve(self) -> list[tuple[CurvePoint, float, float]]:
-        """Points and end of the learning curve, with wall and processor times [s], or NaN."""
+        """Points and end of the curve, with wall and processor times [s], or NaN."""
         clock, unknown = self.clock, (math.nan,) * len(self.curve)
         columns = [
             times if len(times) == len(self.curve) else unknown
@@ -105,7 +105,7 @@ class Start(NamedTuple):
 
 
 class Task(NamedTuple):
-    """What an executor is given to do.
+    """A task of an executor.
 
     Attributes
     ----------
@@ -114,7 +114,7 @@ class Task(NamedTuple):
     start : Start or None
         Where the training goes on; None for its beginning.
     checkpoint : Path or None
-        Where it saves its state, if there is such a folder where it runs.
+        Where it saves its state, if the folder exists.
     """
 
     run: Run
@@ -123,7 +123,7 @@ class Task(NamedTuple):
 
 
 class TaskResult(NamedTuple):
-    """Result of a training, as it comes back from a worker.
+    """Result of a training from a worker.
 
     Attributes
     ----------
@@ -147,16 +147,16 @@ def train(
     on_point: Callable[[CurvePoint], object] | None = None,
     logs: Path | None = None,
 ) -> TaskResult:
-    """Train and evaluate; the result depends neither on threads nor on interruptions.
+    """Train and evaluate; neither threads nor interruptions change the result.
 
     Parameters
     ----------
     task, threads : Task and int
-        The training, and on how many threads.
+        The training, and its number of threads.
     on_point : callable, optional
         Called with every point of the learning curve.
     logs : Path, optional
-        Folder of the logs for TensorBoard, with a folder for each seed.
+        Folder of logs for TensorBoard, with a folder for each seed.
     """
     run, start, checkpoint = task
     config, learner = run.config, find_learner(run.learner)
@@ -184,7 +184,7 @@ def train(
 
 
 def _run_content(run: Run, end: Start) -> bytes:
-    """Content of the file of a finished training; equal ones give equal bytes."""
+    """Content of the file of a training; equal ones give equal bytes."""
     policy, trials = state_policy(run.config, end.state), run.trials
     faced = trial_set(run.config.problem, trials.count, trials.seed)
     rollouts = faced.simulator.rollout(policy, faced.starts, faced.goals)
@@ -211,7 +211,7 @@ def _run_content(run: Run, end: Start) -> bytes:
 
 @contextmanager
 def _content_of(path: Path, run: Run, unless: tuple[str, ...]) -> Iterator[Archive]:
-    """Header and arrays of the file of a training, without those whose names begin so."""
+    """Header and arrays of a training's file, ``unless`` their names begin so."""
     content = load_archive(path, *ARCHIVE, InvalidInputError, unless=unless)
     with reading(repr(str(path)), ARCHIVE[0], InvalidInputError):
         if content.header["settings"] != run.settings:

@@ -1,4 +1,4 @@
-"""Several training seeds of one recipe: an experiment that leaves policies."""
+"""Several training seeds of one recipe, as an experiment."""
 
 import re
 import shutil
@@ -42,7 +42,7 @@ class TrainedSeed(NamedTuple):
     out : Path
         File of its policy.
     last : CurvePoint or None
-        Its last iteration; None if it was finished earlier.
+        Its last iteration; None if finished earlier.
     """
 
     seed: int

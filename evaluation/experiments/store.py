@@ -31,10 +31,10 @@ class Store:
     """The folder of an experiment and its results.
 
     Every finished training is one file under the hash of its settings, ``runs/KEY.npz``; what has
-    no such file is still to be done. How long it took lies apart in ``made/KEY.json``, because it
-    differs between machines; why a training failed, until it succeeds, in ``failed/KEY.json``; how
-    far it is in ``checkpoints/KEY.npz``; and from where longer ones can go on in ``ends``. A
-    damaged file counts as missing.
+    none is still to be done. How long it took, which differs between machines, is in
+    ``made/KEY.json``; why it failed, until it succeeds, in ``failed/KEY.json``; how far it is in
+    ``checkpoints/KEY.npz``; and where longer ones can go on in ``ends``. A damaged file counts as
+    missing.
     """
 
     folder: Path
@@ -47,7 +47,7 @@ class Store:
 
     @contextmanager
     def writing(self, experiment: Experiment) -> Iterator["Store"]:
-        """Claim the folder for an experiment, and keep other processes from writing to it.
+        """Claim the folder for an experiment and keep other writers out.
 
         Raises
         ------
@@ -93,7 +93,7 @@ class Store:
         return found
 
     def start(self, run: Run) -> Start | None:
-        """Where an interrupted training, or one that a shorter one began, can go on."""
+        """Where a training goes on that was interrupted or begun by a shorter one."""
         paths, found = [self.path("checkpoints", run)], []
         if run.can_extend:
             paths.append(self.path("ends", run))

@@ -43,7 +43,7 @@ class Study:
     folder : str or Path
         Folder of the trainings.
     runs : tuple of Run, optional
-        The trainings, instead of those that the experiment plans.
+        The trainings, instead of those of the experiment.
 
     Raises
     ------
@@ -75,7 +75,7 @@ class Study:
 
     @classmethod
     def load(cls, folder: str | Path) -> "Study":
-        """Read the experiment that lies in a folder.
+        """Read the experiment in a folder.
 
         Raises
         ------
@@ -114,9 +114,9 @@ class Study:
         ----------
         jobs, threads : int
             Trainings at a time, one a processor by default, and threads of each; neither changes
-            the results.
+            results.
         executor : Executor, optional
-            Where trainings run; worker processes of this machine by default.
+            Where trainings run; processes of this machine by default.
         logs : Path, optional
             Folder of the logs for TensorBoard.
         on_trained : callable
@@ -127,8 +127,8 @@ class Study:
         TrainingFailedError
             If trainings failed; all others are finished.
         KinarmError
-            If the folder is that of another experiment or cannot be written to, a package is
-            missing, or workers end unexpectedly.
+            If the folder is of another experiment or cannot be written to, a package is missing,
+            or workers end unexpectedly.
         """
         whole_number("threads", threads, 1)
         jobs = available_threads() if jobs is None else whole_number("jobs", jobs, 1)
@@ -163,7 +163,7 @@ class Study:
 
     @contextmanager
     def _progress(self, total: int, done: list[str]) -> Iterator[Callable[[], None]]:
-        """Show how many trainings are done, the last one, and how far others are."""
+        """Show how many trainings are done, and how far others are."""
         over = Event()
 
         def show() -> None:
@@ -232,7 +232,7 @@ class Study:
         return {run: error for run, error in found.items() if error is not None}
 
     def policy(self, run: Run) -> Policy:
-        """The policy of a finished training, with the versions and commit that made it.
+        """The policy of a finished training, with its versions and commit.
 
         Raises
         ------
@@ -312,7 +312,7 @@ class Study:
         return rows
 
     def table(self) -> NDArray[Any]:
-        """The `rows` as a structured array; fields that are no numbers are texts."""
+        """The `rows` as a structured array of numbers and texts."""
         rows = self.rows()
         columns = {name: _column([row[name] for row in rows]) for name in (rows[0] if rows else ())}
         kinds = [(name, column.dtype) for name, column in columns.items()]
@@ -320,6 +320,6 @@ class Study:
 
 
 def _column(values: Sequence[Any]) -> NDArray[Any]:
-    """Values as an array: of numbers if all are numbers, else of texts."""
+    """Values as an array of numbers, or else of texts."""
     numbers = all(isinstance(each, bool | int | float) for each in values)
     return np.array(values if numbers else ["" if v is None else shown(v) for v in values])

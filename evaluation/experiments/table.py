@@ -34,7 +34,7 @@ class Group:
     Attributes
     ----------
     label : str
-        What sets them apart from the other groups of the experiment.
+        What sets them apart from other groups.
     entry, config, choices : Entry, TrainingConfig and mapping
         What they belong to, settings of the first, and what varies, by field.
     runs : tuple of TrainedRun
@@ -57,18 +57,18 @@ class Group:
 
     @cached_property
     def success(self) -> Estimate:
-        """Share of trials with success, and its 95 % interval over seeds and trials."""
+        """Share of successful trials, and its 95 % interval over seeds and trials."""
         return share_over_seeds(self.hits)
 
     @cached_property
     def reachable(self) -> float:
-        """Share of the trials in which the oracle reaches the goal; 1 if unknown."""
+        """Share of trials that the oracle solves; 1 if unknown."""
         return 1.0 if self.bounds is None else float(self.bounds.reachable.mean())
 
     @property
     def relative_success(self) -> float:
         """Success over what the oracle reaches."""
-        return float(self.success.value or 0.0) / max(self.reachable, 1e-9)
+        return (self.success.value or 0.0) / max(self.reachable, 1e-9)
 
     @cached_property
     def figures(self) -> dict[str, float]:
@@ -87,14 +87,14 @@ class Group:
 
     @property
     def steps_to_success(self) -> float | None:
-        """Median steps of trials with success, mean over the seeds; None if a seed has none."""
+        """Median steps of successful trials, mean over seeds; None if a seed has none."""
         if not self.hits.any(axis=1).all():
             return None
         each = [np.median(run.outcomes.steps[run.outcomes.success]) for run in self.runs]
         return float(np.mean(each))
 
     def until(self, level: float) -> tuple[float, float, float]:
-        """Effort until policies first succeed in a share of trials; medians over seeds.
+        """Effort until policies reach a level of success; medians over seeds.
 
         Returns
         -------
@@ -170,7 +170,7 @@ def _interval(group: Group) -> str:
 
 
 def _until(level: float) -> Callable[[Group], str]:
-    """Environment steps [thousands] and processor time [min] until a level of success."""
+    """Environment steps [thousands] and processor time [min] to a success level."""
 
     def text(group: Group) -> str:
         steps, _, seconds = group.until(level)
@@ -227,7 +227,7 @@ def curve_rows(study: "Study") -> list[dict[str, Any]]:
 def group_entries(group: Group) -> dict[str, Any]:
     """A group as JSON holds it.
 
-    ``ci95`` is over seeds and trials, ``ci95_of_trials`` over trials that the seeds share.
+    ``ci95`` is over seeds and trials, ``ci95_of_trials`` over the trials alone.
     """
     touched = np.array([run.outcomes.collision for run in group.runs])
     return {

@@ -40,7 +40,7 @@ class ClaimPart:
 
     @property
     def verdict(self) -> Verdict:
-        """Where the interval lies: on the claimed side, on the other one, or on both."""
+        """Whether the interval lies on the claimed side, the other one, or both."""
         low, high = self.estimate.ci95 or (self.threshold, self.threshold)
         if low <= self.threshold <= high:
             return "undecided"
@@ -100,7 +100,7 @@ class Claim:
 
 
 def assess(results: PaperResults, reading: Reading = LITERAL) -> tuple[Claim, ...]:
-    """All claims that can be judged under a reading; the sweep follows the literal one."""
+    """All claims that can be judged under a reading; the sweep is in the literal one."""
     claims = [
         *(_mostly_near(results, reading, task) for task in ("left", "right")),
         _both_is_worse(results, reading),
@@ -155,12 +155,11 @@ def _one_bench_is_poor(results: PaperResults, reading: Reading) -> Claim:
 
 
 def bench_shares(near: NDArray[np.bool_], left: NDArray[np.bool_]) -> tuple[Estimate, Estimate]:
-    """Share of hits on the better and on the worse bench of every seed's policy.
+    """Share of hits on each policy's better and worse bench.
 
     Whether a trial hit, shape (n_seeds, n_trials), and its goal lies on the left, (n_trials,).
-    One half of the trials tells which bench is better and the other measures it, and the other way
-    round: picking the larger of two noisy shares would flatter it. Unknown where a bench has no
-    trials in one of the halves.
+    Each half of the trials tells which bench is better, and the other measures it: picking the
+    larger of two noisy shares would flatter it. Unknown where a bench has no trials in a half.
     """
     half = np.arange(near.shape[1]) % 2 == 0
     groups = [[part & bench for bench in (left, ~left)] for part in (half, ~half)]
@@ -200,7 +199,7 @@ def _ars_needs_fewer_steps(results: PaperResults, reading: Reading) -> Claim:
 
 
 def steps_to_levels(runs: Iterable[PaperRun]) -> NDArray[np.float64]:
-    """Environment steps to `LEARNING_LEVELS`, shape (n_levels, n_runs); infinity for never."""
+    """Steps to `LEARNING_LEVELS`, shape (n_levels, n_runs); infinity for never."""
     return np.array([[run.steps_to_level(*level) for level in LEARNING_LEVELS] for run in runs]).T
 
 
@@ -244,7 +243,7 @@ def _many_perturbations_are_worse(results: PaperResults) -> tuple[Claim, Claim]:
 
 
 def _difference(measure: str, groups: Sequence[tuple[bool, NDArray[Any]]]) -> ClaimPart:
-    """Mean of the chosen groups of trainings, less that of the others, claimed above zero."""
+    """Mean of the chosen groups less that of the others, claimed above zero."""
     n = sum(chosen for chosen, _ in groups)
     terms = [(1.0 / n if chosen else -1.0 / (len(groups) - n), values) for chosen, values in groups]
     return ClaimPart(measure, contrast(terms), "above", 0.0)

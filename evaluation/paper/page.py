@@ -1,4 +1,4 @@
-"""The files of the reproduction: its page, figures, claims, table and policies."""
+"""The files of the reproduction: page, figures, claims, table and policies."""
 
 import json
 from collections.abc import Iterable, Mapping, Sequence
@@ -38,7 +38,7 @@ STYLES: dict[str, dict[str, Any]] = {
     "ars": {"label": LEARNERS["ars"], "color": COLOURS[0], "linestyle": "solid"},
     "ppo": {"label": LEARNERS["ppo"], "color": COLOURS[1], "linestyle": "dashed"},
 }
-"""How lines of a learner look; its seeds are thin and faint in the same colour."""
+"""Lines of a learner; its seeds are thin and faint in the same colour."""
 
 SHOWN_DISTANCE, NARROWEST = 1.2, 0.005
 """End of the axes of final distances, and least bandwidth of a density [m]."""
@@ -53,7 +53,7 @@ CLAIM_COLUMNS = ("claim", "measure", "measured (95 %)", "claimed", "verdict")
 
 
 def write_all(study: Study, command: str) -> Sequence[Claim]:
-    """Write all files of the finished reproduction, and return the claims read literally.
+    """Write all files of the reproduction, and return the claims read literally.
 
     The command is recorded.
     """
@@ -75,7 +75,7 @@ def write_all(study: Study, command: str) -> Sequence[Claim]:
 
 
 def _save_policies(study: Study, results: PaperResults) -> list[str]:
-    """Write every policy to a file, and return the commits that they were made at."""
+    """Write every policy to a file, and return their commits."""
     folder, commits = study.store.folder / "policies", set()
     check_folder(folder)
     for run in results.runs:
@@ -200,8 +200,8 @@ def figure_2(results: PaperResults) -> "Figure":
 def figure_3(results: PaperResults) -> "Figure":
     """Densities of the final distances of ARS and PPO, a row per task (paper, Figure 3).
 
-    Behind them is the oracle's: what could be reached. Heights are square roots, which show broad
-    and narrow densities side by side.
+    Behind them is the oracle's. Heights are square roots, which show broad and narrow densities
+    side by side.
     """
     figure, panels = panels_figure((7.5, 8.4), len(PROBLEMS), 1, sharex=True)
     for number, (task, axes) in enumerate(zip(PROBLEMS, panels[:, 0], strict=True), start=1):

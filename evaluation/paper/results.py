@@ -1,4 +1,4 @@
-"""The finished trainings of the reproduction, for claims, tables and figures."""
+"""The finished trainings of the reproduction, in order."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -22,7 +22,7 @@ PURPOSES = ("sweep", "ars", "ppo")
 LEARNERS = {"ars": "ARS", "ppo": "PPO"}
 
 NEAR = 0.2
-"""Distance within which the paper calls a trial near its goal (section 4) [m]."""
+"""Distance within which a trial ends near its goal (section 4) [m]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -32,11 +32,10 @@ class Reading:
     Parameters
     ----------
     start_spread : float
-        Share of the joint ranges about the home pose from which starts are drawn, in training
-        and in trials.
+        Share of the joint ranges about home from which starts are drawn, in training and trials.
     reward : {"progress", "sign"}
-        A step is rewarded by the metres that it brings the tool closer, or by 1 or -1 for closer
-        or farther, divided by the horizon.
+        Reward of a step: the metres that it brings the tool closer, or 1 or -1 for closer or
+        farther, divided by the horizon.
     sharing : {"none", "pair", "iteration"}
         Which rollouts of an ARS iteration face the same start and goal.
     """
@@ -130,12 +129,12 @@ class PaperRun:
         return np.asarray(self.trained.curve_distance, dtype=np.float32)
 
     def steps_to_level(self, distance: float, share: float) -> float:
-        """Environment steps to a share of trials within a distance [m]; infinity for never."""
+        """Steps until a share of trials ends within a distance [m]; infinity for never."""
         reached = (self.curve_distance <= distance).mean(axis=1) >= share
         return float(self.curve_steps[reached.argmax()]) if reached.any() else float("inf")
 
     def distance_after(self, environment_steps: float) -> NDArray[np.float32]:
-        """Final distances [m] at the last point within a number of steps, or at the first."""
+        """Final distances [m] at the last point within some steps, or at the first."""
         within = int(np.count_nonzero(self.curve_steps <= environment_steps))
         last: NDArray[np.float32] = self.curve_distance[max(within - 1, 0)]
         return last
@@ -177,7 +176,7 @@ class PaperResults:
         purpose, task : str
             One of `PURPOSES`, and the name of a task; all tasks by default.
         reading : Reading
-            How they read the paper; what does not concern PPO does not count there.
+            How they read the paper; for PPO, only what concerns it.
         """
         if purpose == "ppo":
             reading = Reading(start_spread=reading.start_spread, reward=reading.reward)
@@ -197,8 +196,8 @@ class PaperResults:
     def trial_set(self, task: str, reading: Reading = LITERAL) -> TrialSet:
         """Trials that the final policies faced.
 
-        Those of the paper's tasks are crossed: trial by trial, all tasks have the same start, and
-        goals at the same place of the left or right bench.
+        Under one reading, the paper's tasks are crossed: each trial has the same start, and its
+        goal at the same place of the left or right bench.
         """
         problem = PROBLEMS[task].replace(start_spread=reading.start_spread)
         return trial_set(problem, self.experiment.trials.count, self.experiment.trials.seed)

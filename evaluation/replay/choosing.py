@@ -1,4 +1,4 @@
-"""Trials to replay: new ones, those of an evaluation, or the recordings of a file."""
+"""Trials to replay: new, of an evaluation, or recordings of a file."""
 
 from collections import Counter
 from collections.abc import Collection, Sequence
@@ -29,11 +29,10 @@ if TYPE_CHECKING:
     from kinarm.evaluation.replay.request import ReplayRequest
 
 PLAYED, SEARCHED, FAILING = 5, 200, 10_000
-"""Trials played by default, searched for some, and searched for failures."""
+"""Default numbers of trials: to play, to choose from, to look for failures in."""
 
 MOST_FAILURES = 500
 """Most failures that a page holds."""
-
 
 Trial = tuple[Recording, ...]
 """One trial as run by one policy, or by two."""
@@ -41,7 +40,7 @@ Trial = tuple[Recording, ...]
 
 @dataclass(frozen=True)
 class Candidates:
-    """Trials to choose from, how many are played by default, and the set that they are of."""
+    """Trials to choose from, how many are played by default, and their set."""
 
     trials: list[Trial]
     played: int
@@ -56,7 +55,7 @@ class Chosen(NamedTuple):
     runs : list
         Recordings of one policy, or of two in the same trials.
     groups : sequence of str
-        The group of each trial, if there are groups.
+        The group of each trial, if any.
     heading : str
         Heading of the list.
     """
@@ -67,7 +66,7 @@ class Chosen(NamedTuple):
 
 
 def chosen_recordings(request: "ReplayRequest") -> Chosen:
-    """The recordings that a request asks for, with bounds; the first policy decides."""
+    """The recordings of a request, with bounds; the first policy decides."""
     candidates = _find_candidates(request)
     trials = candidates.trials
     if request.failures:
@@ -92,7 +91,7 @@ def find_failures(
     trials: int = FAILING,
     seed: int = 0,
 ) -> Chosen:
-    """Record all failures of some policies, and the oracle in the same trials.
+    """Record all failures of policies, and the oracle in the same trials.
 
     They are grouped by recipe and cause, the most frequent cause first.
 
@@ -113,7 +112,7 @@ def find_failures(
     Raises
     ------
     KinarmError
-        If a name or number cannot be used, nothing failed somewhere, or too much did.
+        If a name or number cannot be used, or too few or too many trials failed.
     """
     found = []
     for policy, problem in product(policies, problems):
@@ -160,8 +159,8 @@ def named_contestants(
 ) -> tuple[list[Contestant], ReachProblem]:
     """The contestants of names, and the problem that they face.
 
-    It is the one that options name (for the best policy, the usual one by default), or that of the
-    first trained contestant, changed by the options.
+    Options name it (for the best policy, the usual one by default), or change that of the first
+    trained contestant.
     """
     named = options.problem is not None or options.task is not None
     stated = options.resolve() if named or BEST in names else None
@@ -216,7 +215,7 @@ def _check_same(row: Result, recordings: Sequence[Recording]) -> None:
 
 
 def _known_contestant(name: str, path: Path) -> Contestant:
-    """The contestant of a name, which must not stand for a file of the user's."""
+    """The contestant of a name that is no user's file."""
     if name in (*UNTRAINED, *policy_names()) or is_import_path(name):
         return _first_contestant(name)
     raise InvalidInputError(f"policy {name!r} of {str(path)!r} is a file: name it with --policy")
@@ -232,7 +231,7 @@ def _name_in(document: EvaluationDocument, contestant: Contestant) -> str:
 def _recorded_candidates(
     path: Path, names: Sequence[str | None], problem: str | None, arm: str | None
 ) -> Candidates:
-    """Take recordings from a file; ``arm`` says where the URDF of their arm lies now."""
+    """Take recordings from a file; ``arm`` is where their URDF lies now."""
     found = [each for each in load_recordings(path) if problem in (None, each.problem.name)]
     if arm is not None:
         moved = (each.problem.replace(arm=replace(each.problem.arm, source=arm)) for each in found)
@@ -252,7 +251,7 @@ def _recorded_candidates(
 def _with_bounds(
     candidates: Candidates, chosen: Sequence[Trial], *, oracle: bool
 ) -> list[list[Recording]]:
-    """Recordings of some trials by policy, with lower bounds if the oracle is asked."""
+    """Recordings by policy, with lower bounds if the oracle is asked."""
     runs = [list(run) for run in zip(*chosen, strict=True)]
     if candidates.faced is None or not oracle:
         return runs

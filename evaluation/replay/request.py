@@ -29,7 +29,7 @@ NOT_FROM_FILE = (
     *("tool_frame", "package_dirs", "task", "scene", "tolerance", "horizon", "start_spread"),
     *("seed", "trials"),
 )
-"""Fields that mean nothing for the live page, and for trials from a file."""
+"""Fields without meaning for the live page, and for trials from a file."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -163,7 +163,7 @@ class ReplayRequest(ProblemOptions):
         return self._write(report)
 
     def recordings(self) -> "list[list[Recording]]":
-        """Make or read the recordings to play: one list for each policy.
+        """Make or read the recordings to play, a list for each policy.
 
         Raises
         ------
@@ -230,7 +230,7 @@ class ReplayRequest(ProblemOptions):
 
 
 def normalization_note(recording: "Recording") -> str:
-    """Which statistics normalised what a policy saw, in a line; empty without them."""
+    """Which statistics normalised observations, in a line; may be empty."""
     policy = recording.provenance.get("policy") or {}
     statistics = policy.get("config", {}).get("vec_normalize")
     return f"{recording.policy}: observations normalised by {statistics}" if statistics else ""

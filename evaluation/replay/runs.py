@@ -1,4 +1,4 @@
-"""Recordings of contestants in trials, to keep or to follow on a live page."""
+"""Recordings of contestants, to keep or to follow live."""
 
 import itertools
 import time

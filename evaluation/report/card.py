@@ -15,7 +15,7 @@ from kinarm.problem import ReachProblem
 from kinarm.viewer import replay_page
 
 FIRST, WORST = 3, 3
-"""Trials of the replay: the first ones, and those that ended worst."""
+"""Trials of the replay: the first, and the worst."""
 
 
 def check_card(
@@ -55,7 +55,7 @@ def write_card(path: Path, document: EvaluationDocument, evaluations: Sequence[E
     path : Path
         The card, in Markdown; its name ends in .md.
     document : EvaluationDocument
-        What `evaluation_document` made of the evaluations.
+        The document of the evaluations.
     evaluations : sequence of Evaluation
         Those of the policy, and of the oracle if it took part.
     """
@@ -102,7 +102,7 @@ def policy_card(name: str, document: EvaluationDocument, evaluation: Evaluation)
 
 
 def shown_trials(evaluation: Evaluation) -> list[int]:
-    """Trials of the replay: the first, then the worst of the others, failures first."""
+    """The first trials, then the worst others, failures first."""
     rollouts, count = evaluation.rollouts, len(evaluation.trials)
     others = range(min(FIRST, count), count)
     ranked = sorted(others, key=lambda n: (bool(rollouts.success[n]), -rollouts.distance[n]))

@@ -19,7 +19,7 @@ SCALE = 200
 """Units of the SVG to a metre."""
 
 MAP_MARGIN, BASE_RADIUS, AXIS_LENGTH = 0.07, 0.1, 0.2
-"""Margin of a map, radius of the arm's base, and length of the world axes [m]."""
+"""Margin of a map, radius of the arm's base, length of the axes [m]."""
 
 MARKERS = 1000
 """Most trials that a map marks, the first ones; its figures count all."""
@@ -37,7 +37,7 @@ def profiles(results: ProblemResults) -> tuple[list[float], list[list[Estimate]]
     Returns
     -------
     limits, shares : list of float, list of list of Estimate
-        Distances [m], ascending, and the share of trials of each group within each of them.
+        Distances [m], ascending, and each group's share of trials within each.
     """
     furthest = max(float(group.distances.max()) for group in results.groups)
     low, high = results.tolerance / 5, max(furthest, 2 * results.tolerance)
@@ -73,7 +73,7 @@ class View(NamedTuple):
 
 
 def worst_outcomes(group: Group) -> list[str]:
-    """Outcome of each trial: contact if any training seed had it, success if all had."""
+    """Outcome of each trial: contact if any seed had it, success if all had."""
     collision = np.any([member.rollouts.collision for member in group.members], axis=0)
     success = np.where(group.success.all(axis=0), "success", "truncated")
     outcomes: list[str] = np.where(collision, "collision", success).tolist()
@@ -88,7 +88,7 @@ def level(distance: float, tolerance: float) -> int:
 
 
 class Marker(NamedTuple):
-    """The goal of a trial: mean distance [m], outcome, and how many seeds reached it."""
+    """A goal: mean distance [m], outcome, and how many seeds reached it."""
 
     trial: int
     goal: list[float]
@@ -109,7 +109,7 @@ def markers(group: Group) -> list[Marker]:
 def failure_shares(
     group: Group, region: GoalRegion
 ) -> list[tuple[tuple[float, float], float | None]]:
-    """Share of trials of all seeds that did not succeed, in slices of a region along x.
+    """Share of trials that failed, over all seeds, in slices of a region along x.
 
     Each with the ends of its slice [m], ascending; None where no goal lies.
     """

@@ -1,4 +1,4 @@
-"""What a report shows as one, a policy or a recipe's training seeds, and its worst trials."""
+"""Groups of a report, a policy or training seeds each, and worst trials."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -25,16 +25,15 @@ PAGE_COLOURS, PAGE_DASHES = 6, 4
 UNTRAINED_ALGORITHMS = ("baseline", "oracle")
 """Algorithms of contestants that are no policies."""
 
-
 BEST_GROUPS, TRIALS, AT_LEAST = 4, 9, 3
-"""Groups whose worst trials are shown, trials that they share, and the least each."""
+"""Groups with worst trials, trials that they share, and the least each."""
 
 
 @dataclass(frozen=True, eq=False)
 class Group:
-    """A row of the table, its evaluations, one per training seed, and its style.
+    """A row of the table, its evaluations by training seed, and its style.
 
-    The style is classes of the style sheet.
+    The style names classes of the style sheet.
     """
 
     row: Row
@@ -82,7 +81,7 @@ class ProblemResults:
 
     @property
     def oracle_rate(self) -> float | None:
-        """Share of the trials that the oracle solved, if it was asked."""
+        """Share of trials that the oracle solved, if asked."""
         return self.entry.oracle.success.value if self.entry.oracle else None
 
     @property
@@ -131,7 +130,7 @@ def _styles(labels: Sequence[str], evaluations: Sequence[Evaluation]) -> dict[st
 
 
 class WorstTrial(NamedTuple):
-    """A trial that went badly: of which group and training seed, and its number."""
+    """A bad trial: its group, its training seed's evaluation, and its number."""
 
     group: Group
     evaluation: Evaluation
@@ -139,7 +138,7 @@ class WorstTrial(NamedTuple):
 
 
 def worst_trials(results: ProblemResults) -> tuple[WorstTrial, ...]:
-    """The worst trials of the best groups of a problem: failures first, the farthest first.
+    """The worst trials of a problem's best groups: failures first, the farthest first.
 
     No trial is there twice: a better group, which has fewer failures, chooses first.
     """

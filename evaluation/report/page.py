@@ -25,7 +25,7 @@ from kinarm.viewer import replay_page
 def write_report(
     folder: str | Path, document: EvaluationDocument, evaluations: Sequence[Evaluation]
 ) -> Path:
-    """Write the report of an evaluation as ``index.html``, and return its path.
+    """Write the report as ``index.html``, and return its path.
 
     Parameters
     ----------
@@ -48,8 +48,8 @@ def write_report(
 def report_page(document: EvaluationDocument, evaluations: Sequence[Evaluation]) -> str:
     """The report of an evaluation: one HTML page that fetches nothing.
 
-    It holds the table, performance profiles, histograms, maps of the benches, the worst trials and
-    how everything was made. Equal input gives equal text.
+    It holds the table, profiles, histograms, maps of the benches, the worst trials and how
+    everything was made. Equal input gives equal text.
 
     Parameters
     ----------
