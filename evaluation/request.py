@@ -1,4 +1,4 @@
-"""An evaluation from what is asked for to what is written: the main path, on one screen."""
+"""An evaluation, from the request to the files."""
 
 from collections.abc import Callable
 from contextlib import ExitStack
@@ -17,14 +17,14 @@ if TYPE_CHECKING:
     from kinarm.evaluation.selection import Pair
 
 DOCUMENT, HISTOGRAMS, REPORT = "evaluation.json", "final_distance", "index.html"
-"""Files that are written; the histograms as PNG and as SVG."""
+"""Files that are written; the histograms as PNG and SVG."""
 
 Tell = Callable[[str], object]
-"""Is told what is being done."""
+"""Called with what is being done."""
 
 
 def policy_choices() -> tuple[str, ...]:
-    """Names of policies, their groups and baselines, which a policy can be chosen by."""
+    """Names by which a policy can be chosen."""
     from kinarm.evaluation.contestants import UNTRAINED
     from kinarm.policies.library import BEST, group_of, policy_names
 
@@ -124,7 +124,7 @@ class EvaluationRequest(ProblemOptions):
     def run(self, command: str | None = None, tell: Tell = lambda _: None) -> "EvaluationDocument":
         """Evaluate, and write the outputs.
 
-        ``command`` is recorded as what did it, or this request; ``tell`` hears what is being done.
+        ``command`` is recorded, by default this request; ``tell`` hears what is being done.
         """
         from kinarm.evaluation.evaluation import evaluation_document
 
@@ -138,7 +138,7 @@ class EvaluationRequest(ProblemOptions):
         return document
 
     def evaluate(self, tell: Tell = lambda _: None) -> "list[Evaluation]":
-        """Let every chosen policy face its trials; as `run`, but for the files."""
+        """Let every chosen policy face its trials; as `run`, without the files."""
         return self._face(self._checked_pairs(), tell)
 
     def _face(self, pairs: "list[Pair]", tell: Tell) -> "list[Evaluation]":
@@ -197,7 +197,7 @@ class EvaluationRequest(ProblemOptions):
             save_figure(distance_histograms(shown), self.out, HISTOGRAMS)
 
     def _checked_pairs(self) -> "list[Pair]":
-        """Who faces which problem, if all of them can and the files can be written."""
+        """Who faces which problem, after checks of policies and files."""
         from kinarm.evaluation.selection import select_pairs
 
         pairs = select_pairs(self)

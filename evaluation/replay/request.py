@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from kinarm.viewer import ReplayPage
 
 ALTERNATIVES = (("policy", "compare"), ("trial", "worst", "collisions", "failures"))
-"""Fields of which one at most can be given."""
+"""Fields that exclude each other."""
 
 NOT_LIVE = (
     *("source", "compare", "trial", "worst", "collisions", "failures", "trials", "out", "record"),
@@ -29,7 +29,7 @@ NOT_FROM_FILE = (
     *("tool_frame", "package_dirs", "task", "scene", "tolerance", "horizon", "start_spread"),
     *("seed", "trials"),
 )
-"""Fields that mean nothing for the live page, and for trials from a file."""
+"""Fields without meaning for the live page, and for trials from a file."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -143,9 +143,9 @@ class ReplayRequest(ProblemOptions):
         return ["a file" if item.name == "source" else option_name(item) for item in given]
 
     def run(self, report: Callable[[str], object] = lambda _: None) -> "ReplayPage | None":
-        """Write the page, and the recordings if that is asked for, and return it.
+        """Write the page, and the recordings if asked for, and return it.
 
-        Or serve the live page until this is interrupted.
+        Or serve the live page until interrupted.
 
         Parameters
         ----------
@@ -163,7 +163,7 @@ class ReplayRequest(ProblemOptions):
         return self._write(report)
 
     def recordings(self) -> "list[list[Recording]]":
-        """Make or read the recordings to play: one list for each policy.
+        """Make or read the recordings to play, a list for each policy.
 
         Raises
         ------
@@ -230,7 +230,7 @@ class ReplayRequest(ProblemOptions):
 
 
 def normalization_note(recording: "Recording") -> str:
-    """Which file normalised what a policy saw, in a line; empty if none did."""
+    """Which statistics normalised observations, in a line; may be empty."""
     policy = recording.provenance.get("policy") or {}
     statistics = policy.get("config", {}).get("vec_normalize")
     return f"{recording.policy}: observations normalised by {statistics}" if statistics else ""
