@@ -40,16 +40,18 @@ _known: WeakKeyDictionary[TrialSet, OracleSolutions] = WeakKeyDictionary()
 def oracle_bounds(trials: TrialSet, on_progress: Progress | None = None) -> OracleSolutions:
     """Look up what the oracle knows about trials, or solve and keep it.
 
-    Solutions are kept in the cache folder, under the hash of the trials and of the oracle's
-    version, and in memory as long as the trials are. An unreadable file is replaced; where none can
-    be written, nothing is kept. Beyond ``KEPT_BYTES``, what was used least recently goes.
+    Solutions are kept in the cache folder, under the hash of the trials and of
+    the oracle's version, and in memory as long as the trials are. An unreadable
+    file is replaced; where none can be written, nothing is kept. Beyond
+    ``KEPT_BYTES``, what was used least recently goes.
 
     Parameters
     ----------
     trials : TrialSet
         The trials.
     on_progress : callable, optional
-        Called with the number of trials solved so far and in all, unless they are known.
+        Called with the number of trials solved so far and in all, unless they
+        are known.
     """
     if trials not in _known:
         path = cache_folder() / f"oracle-{trials.digest}-{oracle_version()}.npz"
@@ -109,7 +111,8 @@ class TrialBounds(Document, frozen=True, kw_only=True):
     steps, steps_lower_bound : list of int
         Steps of the motion that was found, and steps proven necessary.
     final_distance, distance_lower_bound : list of float
-        How close the motion comes, and no motion within the horizon comes closer [m].
+        How close the motion comes, and no motion within the horizon comes
+        closer [m].
     """
 
     reachable: list[bool]
@@ -130,8 +133,8 @@ class Bounds(Document, frozen=True, kw_only=True):
     success : Estimate
         Share of trials with a motion to the goal.
     steps, steps_lower_bound, gap : dict of float
-        Mean, median, 95th percentile and maximum: of the motions, of the bounds, and of their
-        difference in trials with a motion.
+        Mean, median, 95th percentile and maximum: of the motions, of the
+        bounds, and of their difference in trials with a motion.
     """
 
     bounded: Count

@@ -52,7 +52,8 @@ class Contestant:
     name : str
         Name in tables.
     run : callable
-        Runs a set of trials; with ``record``, it keeps the configurations visited.
+        Runs a set of trials; with ``record``, it keeps the configurations
+        visited.
     algorithm, recipe, seed : str, str, int or None
         How it was made, and its training seed.
     policy, source : Policy or None, Path or None
@@ -196,9 +197,10 @@ def find_contestants(
     Parameters
     ----------
     name_or_file : str or Path
-        A baseline, ``"oracle"``, a shipped policy, a group of them (all training seeds),
-        ``"best"``, a policy file, a folder of them, a model of Stable-Baselines3 (.zip) or
-        ``"module:function"``. Models and modules run code: open only those that you trust.
+        A baseline, ``"oracle"``, a shipped policy, a group of them (all
+        training seeds), ``"best"``, a policy file, a folder of them, a model of
+        Stable-Baselines3 (.zip) or ``"module:function"``. Models and modules
+        run code: open only those that you trust.
     problem : ReachProblem, str or Path, optional
         What a model or ``"best"`` is for; others say it themselves.
     """

@@ -81,7 +81,8 @@ class Protocol(Document, frozen=True, kw_only=True):
     versions : dict of str
         Versions of Python and libraries that results may depend on.
     commit : str, optional
-        Commit of kinarm, -dirty behind it if files were changed; null without Git.
+        Commit of kinarm, -dirty behind it if files were changed; null without
+        Git.
     """
 
     format_version: Literal[4] = 4
@@ -117,8 +118,8 @@ class TrialHolding(Document, frozen=True, kw_only=True):
     Parameters
     ----------
     closest, farthest_at_end : list of float
-        Smallest distance from the goal, and the largest one in the last steps, null where contact
-        ended the trial [m].
+        Smallest distance from the goal, and the largest one in the last steps,
+        null where contact ended the trial [m].
     """
 
     closest: list[float]

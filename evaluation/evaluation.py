@@ -243,9 +243,9 @@ def evaluate(
     Parameters
     ----------
     policy : str, Path, Policy, Contestant, function or predictor
-        A name or file as for `find_contestants` (of a group, the first seed); a policy; a function
-        from observations (n, n_observations) to actions (n, n_actions); or what has a ``predict``
-        as in Stable-Baselines3.
+        A name or file as for `find_contestants` (of a group, the first seed); a
+        policy; a function from observations (n, n_observations) to actions (n,
+        n_actions); or what has a ``predict`` as in Stable-Baselines3.
     problem : ReachProblem, str or Path, optional
         The problem; by default the one that the policy was trained for.
     trials, seed : int
@@ -253,18 +253,23 @@ def evaluate(
     allow_other_arm : bool
         Whether a policy may face an arm that it was not trained for.
     oracle : bool
-        Whether to bound what any policy could do, in the first 2000 trials at most.
+        Whether to bound what any policy could do, in the first 2000 trials at
+        most.
     hold : bool
-        Whether to run the trials once more without an end at success; see `Evaluation`.
+        Whether to run the trials once more without an end at success; see
+        `Evaluation`.
     **overrides
-        Changes of the problem, such as ``tolerance``; see `kinarm.ReachProblem.replace`.
+        Changes of the problem, such as ``tolerance``; see
+        `kinarm.ReachProblem.replace`.
 
     Raises
     ------
     InvalidInputError
-        If a number is out of range, or no problem is given for an untrained policy.
+        If a number is out of range, or no problem is given for an untrained
+        policy.
     PolicyFileError
-        If the policy cannot be read, was trained for another arm, or does not fit this one.
+        If the policy cannot be read, was trained for another arm, or does not
+        fit this one.
     """
     contestant = contestant_of(policy, problem)
     faced = problem if problem is not None else contestant.problem

@@ -35,24 +35,26 @@ class Metric:
     Attributes
     ----------
     meaning, definition : str
-        What it is, and its mathematical formula, with the letters of the documentation.
+        What it is, and its mathematical formula, with the letters of the
+        documentation.
     formula : callable
-        From `Outcomes` to the figure; None or NaN if unknown. For intervals it works along the
-        last axis of many resamples.
+        From `Outcomes` to the figure; None or NaN if unknown. For intervals it
+        works along the last axis of many resamples.
     unit : str
         ``"%"`` for shares, kept as fractions and shown in per cent.
     interval : ``"Wilson"``, ``"bootstrap"`` or None
-        How its 95 % interval is made. Wilson's is for shares of trials; the formula also gets
-        each trial by itself.
+        How its 95 % interval is made. Wilson's is for shares of trials; the
+        formula also gets each trial by itself.
     needs_bounds, needs_holding : bool
         Whether it needs the oracle, or trials that go on after success.
     heading, spread_heading : str
-        Headings of its column, and of its range over training seeds; without one it is in
-        documents alone.
+        Headings of its column, and of its range over training seeds; without
+        one it is in documents alone.
     digits, shows_interval : int, bool
         Decimals, and whether the interval is shown.
     beside : tuple of str, optional
-        Another metric in the same column, and how it is shown, such as ``"{} s"``.
+        Another metric in the same column, and how it is shown, such as ``"{}
+        s"``.
     priority : float
         Where space is scarce, columns of low priority are left out first.
     """

@@ -32,8 +32,8 @@ class Holding:
     closest : ndarray, shape (n,)
         Smallest distance of the tool from the goal after any step [m].
     farthest_at_end : ndarray, shape (n,)
-        Largest distance after the last `HOLDING_STEPS` steps, or all if fewer [m]; infinite where
-        contact ended the trial.
+        Largest distance after the last `HOLDING_STEPS` steps, or all if fewer
+        [m]; infinite where contact ended the trial.
     collision, steps : ndarray, shape (n,)
         Whether contact ended the trial, and steps taken.
     """
@@ -77,12 +77,14 @@ def _joined(field: str, name: str, meaning: str) -> "cached_property[NDArray[Any
 class Outcomes:
     """Outcomes of one or several training seeds in the same trials.
 
-    Their arrays are joined along the last axis, shape (..., n_seeds * n_trials).
+    Their arrays are joined along the last axis, shape (..., n_seeds *
+    n_trials).
 
     Attributes
     ----------
     rollouts : tuple of Rollouts
-        One per training seed, or what has the same columns without configurations.
+        One per training seed, or what has the same columns without
+        configurations.
     bounds : OracleSolutions or None
         What any policy could do in the trials, or in the first ones, if known.
     holding : tuple of Holding

@@ -72,7 +72,8 @@ class ProblemCheck(Document, frozen=True, kw_only=True):
     problem : dict
         The problem, in the words of problem files.
     mirror : dict of str
-        What keeps it from being its own mirror image; empty texts if nothing does.
+        What keeps it from being its own mirror image; empty texts if nothing
+        does.
     """
 
     problem: dict[str, Any]

@@ -36,20 +36,21 @@ def policy_choices() -> tuple[str, ...]:
 class EvaluationRequest(ProblemOptions):
     """Evaluate policies on random reaching trials, beside an oracle.
 
-    By default a trained policy faces the problem that it was trained for, changed as the options
-    say, a symmetric one also those with a part of its goals, and a baseline all problems in play.
-    Problems that are named restrict the default selection; together with named policies, or
-    ``matrix``, they say what those face. The oracle joins on every problem that is faced.
+    By default a trained policy faces the problem that it was trained for,
+    changed as the options say, a symmetric one also those with a part of its
+    goals, and a baseline all problems in play. Problems that are named restrict
+    the default selection; together with named policies, or ``matrix``, they say
+    what those face. The oracle joins on every problem that is faced.
 
     Parameters
     ----------
     policies : tuple of str
-        Shipped policy, recipe (all its seeds), best, random, zero, oracle, .npz file, folder of
-        them, Stable-Baselines3's model.zip (runs its code: only if you trust it), or
-        module:function; several, and repeatable.
+        Shipped policy, recipe (all its seeds), best, random, zero, oracle, .npz
+        file, folder of them, Stable-Baselines3's model.zip (runs its code: only
+        if you trust it), or module:function; several, and repeatable.
     problems : tuple of str
-        A problem by name, or a problem file; several, and repeatable. ``problem`` is for a single
-        one.
+        A problem by name, or a problem file; several, and repeatable.
+        ``problem`` is for a single one.
     trials : int
         Trials a problem.
     seed : int
@@ -59,17 +60,18 @@ class EvaluationRequest(ProblemOptions):
     matrix : bool
         Every policy on every problem, not only on its own.
     oracle : bool
-        Ask the oracle what any policy could reach: in the first 2000 trials at most, unless the
-        oracle is a named policy.
+        Ask the oracle what any policy could reach: in the first 2000 trials at
+        most, unless the oracle is a named policy.
     hold : bool
-        Run the trials once more, without ending them at success: how close policies come to the
-        goal, and whether they stay there.
+        Run the trials once more, without ending them at success: how close
+        policies come to the goal, and whether they stay there.
     out : Path
         Folder for evaluation.json and histograms.
     report : Path
         Folder for the report: index.html, one page.
     card : Path
-        Card of the one policy that is named (.md), with the policy (.npz) and a replay (.html).
+        Card of the one policy that is named (.md), with the policy (.npz) and a
+        replay (.html).
     overwrite : bool
         Replace earlier results.
     json : bool

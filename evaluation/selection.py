@@ -132,8 +132,8 @@ def check_names(pairs: Iterable[Pair]) -> None:
 def group_names(contestants: Iterable[Contestant]) -> dict[str, str]:
     """Name of each contestant's group of training seeds, by its own name.
 
-    Seeds of a group share learner, settings and problem. If a seed occurs twice, shipped policies,
-    and those of each folder, are apart.
+    Seeds of a group share learner, settings and problem. If a seed occurs
+    twice, shipped policies, and those of each folder, are apart.
 
     Parameters
     ----------

@@ -124,8 +124,9 @@ def wilson_interval(hits: int, trials: int, seeds: int = 1) -> Interval:
     hits, trials : int
         Hits of all seeds together, and the trials that every seed faced.
     seeds : int
-        Number of training seeds. They face the same trials and are no independent evidence: the
-        interval is that of the trials of one, widened to whole hits.
+        Number of training seeds. They face the same trials and are no
+        independent evidence: the interval is that of the trials of one, widened
+        to whole hits.
     """
 
     def end(hits: int, side: int) -> float:

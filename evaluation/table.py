@@ -107,7 +107,8 @@ def print_table(
     document, console : EvaluationDocument, Console
         What to print, and where.
     markdown : bool
-        As Markdown with all columns; else some are left out where space is scarce.
+        As Markdown with all columns; else some are left out where space is
+        scarce.
     """
     rows = [row for problem in document.protocol.problems for row in table_rows(document, problem)]
     columns = [

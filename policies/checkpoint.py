@@ -63,7 +63,8 @@ def load_checkpoint(path: str | Path) -> Checkpoint:
     Raises
     ------
     PolicyFileError
-        If the file is missing, truncated or not a checkpoint, or the arm has changed.
+        If the file is missing, truncated or not a checkpoint, or the arm has
+        changed.
     """
     header, arrays = load_archive(path, *ARCHIVE, PolicyFileError)
     name = repr(str(path))

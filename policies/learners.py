@@ -28,9 +28,10 @@ class CurvePoint(NamedTuple):
     Attributes
     ----------
     mean_return, std_return, success : float
-        Mean and standard deviation of the returns of the iteration's episodes, and share of
-        success; for PPO, of those that ended in it, and for Stable-Baselines3, of the last hundred
-        that ended. Replays of failed scenarios do not count; NaN if no episode does.
+        Mean and standard deviation of the returns of the iteration's episodes,
+        and share of success; for PPO, of those that ended in it, and for
+        Stable-Baselines3, of the last hundred that ended. Replays of failed
+        scenarios do not count; NaN if no episode does.
     environment_steps, wall_time : int and float
         Steps and time of the iterations [s] since the training began.
     """
@@ -218,8 +219,8 @@ def train_policy(
     on_iteration : callable, optional
         Called with the state after every iteration.
     **options
-        What does not change the result: ``threads``, and for PPO the folder of ``tensorboard``
-        logs.
+        What does not change the result: ``threads``, and for PPO the folder of
+        ``tensorboard`` logs.
     """
     states = training_states(config, state, **options)
     last = next(states)

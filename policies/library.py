@@ -68,15 +68,16 @@ def load_policy(name_or_file: str | Path, problem: ProblemLike | None = None) ->
     Parameters
     ----------
     name_or_file : str or Path
-        Name of a shipped policy, or of a group for its first seed; ``"best"``; or path of a file,
-        or of a folder for the first policy in it.
+        Name of a shipped policy, or of a group for its first seed; ``"best"``;
+        or path of a file, or of a folder for the first policy in it.
     problem : ReachProblem, str or Path, optional
         What the best one is for.
 
     Raises
     ------
     KinarmError
-        If it is neither name nor file, no policy ships for the problem, or the file cannot be used.
+        If it is neither name nor file, no policy ships for the problem, or the
+        file cannot be used.
     """
     return Policy.load(policy_files(name_or_file, problem)[0])
 

@@ -84,8 +84,8 @@ class Normalizer:
         Parameters
         ----------
         moments, counts : ndarray, shape (n, 2, n_observations) and (n,)
-            Per episode, sums of the observations less `mean` and of their squares, and number of
-            observations.
+            Per episode, sums of the observations less `mean` and of their
+            squares, and number of observations.
         """
         added = int(counts.sum())
         if added == 0:

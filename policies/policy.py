@@ -30,7 +30,8 @@ LARGEST = 1e30
 class Policy:
     """Maps observations to actions: normalise, dense layers, clip to [-1, 1].
 
-    A linear policy has one layer. Inputs that were constant in training have weight zero.
+    A linear policy has one layer. Inputs that were constant in training have
+    weight zero.
 
     Parameters
     ----------
@@ -41,9 +42,9 @@ class Policy:
     provenance : Provenance
         Where it comes from, and its problem.
     activations : tuple of str
-        Function after each layer, the last one before the clip: ``"linear"``, ``"tanh"``,
-        ``"relu"``, ``"hardtanh"``, ``"elu"``, ``"leaky_relu"`` or ``"silu"``; by default tanh
-        between the layers and none after the last.
+        Function after each layer, the last one before the clip: ``"linear"``,
+        ``"tanh"``, ``"relu"``, ``"hardtanh"``, ``"elu"``, ``"leaky_relu"`` or
+        ``"silu"``; by default tanh between the layers and none after the last.
     mirror : Mirror, optional
         Reflection in which it sees goals on the left, and acts.
     """
@@ -136,8 +137,8 @@ class Policy:
         Parameters
         ----------
         observation : array_like or mapping
-            One observation or several, as for a call; or a dictionary of ``observation``,
-            ``achieved_goal`` and ``desired_goal``.
+            One observation or several, as for a call; or a dictionary of
+            ``observation``, ``achieved_goal`` and ``desired_goal``.
         state, episode_start, deterministic
             Of no effect; the state is returned as it is.
         """
@@ -164,25 +165,29 @@ class Policy:
     ) -> "Policy":
         """Convert a model of Stable-Baselines3 or sb3-contrib: its deterministic actions.
 
-        The model computes in float32, the policy in float64; actions agree to about 1e-6.
+        The model computes in float32, the policy in float64; actions agree to
+        about 1e-6.
 
         Parameters
         ----------
         model : BaseAlgorithm, str or Path
-            PPO, A2C, SAC, TD3, DDPG or TQC with ``MlpPolicy`` or ``MultiInputPolicy``, or its file.
-            Loading runs code in the file: open only files that you trust.
+            PPO, A2C, SAC, TD3, DDPG or TQC with ``MlpPolicy`` or
+            ``MultiInputPolicy``, or its file. Loading runs code in the file:
+            open only files that you trust.
         problem : ReachProblem, str or Path, optional
-            The problem of the policy; by default that of the model's environment.
-        vec_normalize : VecNormalize, str or Path, optional
-            Statistics of its observations, or their file; by default those of the model's
+            The problem of the policy; by default that of the model's
             environment.
+        vec_normalize : VecNormalize, str or Path, optional
+            Statistics of its observations, or their file; by default those of
+            the model's environment.
 
         Raises
         ------
         KinarmError
-            If the model is recurrent, computes features, has other activation functions, or other
-            observations or actions than the arm; the problem is unknown; a file cannot be read; or
-            Stable-Baselines3 is not installed.
+            If the model is recurrent, computes features, has other activation
+            functions, or other observations or actions than the arm; the
+            problem is unknown; a file cannot be read; or Stable-Baselines3 is
+            not installed.
         """
         from kinarm.policies.conversion.sb3 import policy_from_sb3
 
@@ -205,7 +210,8 @@ class Policy:
         Parameters
         ----------
         module : nn.Module
-            A ``Sequential`` of ``Linear`` and activation functions, maybe nested.
+            A ``Sequential`` of ``Linear`` and activation functions, maybe
+            nested.
         problem : ReachProblem, str or Path
             The problem that it is for.
         mean, std : array_like, shape (n_observations,), optional
@@ -243,8 +249,8 @@ class Policy:
         Raises
         ------
         PolicyFileError
-            If the file is missing, truncated, not a policy, or of another version or layout of
-            observations.
+            If the file is missing, truncated, not a policy, or of another
+            version or layout of observations.
         """
         content = load_archive(path, "policy", FORMAT_VERSION, PolicyFileError)
         with reading(repr(str(path)), "policy", PolicyFileError):

@@ -42,8 +42,8 @@ class Provenance:
     commit : str
         Commit of kinarm's source, with ``-dirty`` if changed; empty if unknown.
     semantics : str, optional
-        Version of what kinarm computes (`kinarm.SEMANTICS`) in its training; unknown in older files
-        and for policies trained elsewhere.
+        Version of what kinarm computes (`kinarm.SEMANTICS`) in its training;
+        unknown in older files and for policies trained elsewhere.
     """
 
     algorithm: str

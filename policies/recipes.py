@@ -27,12 +27,13 @@ def recipe(learner: str, name_or_file: str | Path | None = None, **changes: Any)
     learner : str
         Name of the learner, or ``module:LEARNER``.
     name_or_file : str or Path, optional
-        Name of a recipe, or a TOML file with some settings; the others are those of the recipe that
-        its entry ``base`` names. The default is the learner's first one: that of the paper for ARS
-        and PPO.
+        Name of a recipe, or a TOML file with some settings; the others are
+        those of the recipe that its entry ``base`` names. The default is the
+        learner's first one: that of the paper for ARS and PPO.
     **changes
-        Fields to replace; None leaves a field as it is, a mapping replaces the entries that it
-        names. If another field than problem and seed changes, the recipe's name gets a star.
+        Fields to replace; None leaves a field as it is, a mapping replaces the
+        entries that it names. If another field than problem and seed changes,
+        the recipe's name gets a star.
 
     Returns
     -------
@@ -90,8 +91,8 @@ def _read_recipe(learner: Learner[Any, Any], path: Path, circumstances: Mapping[
 def shipped_learner(name: str, config: type[ConfigT], **parts: Any) -> Learner[ConfigT, Any]:
     """A learner of kinarm, with the recipes of its file in ``data/recipes``.
 
-    A recipe has a ``summary``, settings that replace those of its ``base``, and maybe others
-    ``where_regions_differ``; see `adapted`.
+    A recipe has a ``summary``, settings that replace those of its ``base``, and
+    maybe others ``where_regions_differ``; see `adapted`.
 
     Parameters
     ----------
@@ -121,15 +122,16 @@ def shipped_learner(name: str, config: type[ConfigT], **parts: Any) -> Learner[C
 def adapted(config: ConfigT, apart: Mapping[str, ConfigT]) -> ConfigT:
     """Adapt a recipe to its problem, if it is symmetric.
 
-    Progress is rewarded in proportion to the arm's reach, and training tolerances are shares of the
-    task's.
+    Progress is rewarded in proportion to the arm's reach, and training
+    tolerances are shares of the task's.
 
     Parameters
     ----------
     config : TrainingConfig
         The recipe, with problem and seed.
     apart : mapping of str to TrainingConfig
-        What replaces it where several regions are to be reached that no reflection joins.
+        What replaces it where several regions are to be reached that no
+        reflection joins.
     """
     if not getattr(config, "symmetric", False):
         return config

@@ -72,12 +72,14 @@ class TrainRequest(ProblemOptions):
     settings : mapping
         Settings of the learner that replace those of the recipe.
     out : Path
-        File of the policy, with learning curve and checkpoint beside it; with --seeds, folder of
-        the policies.
+        File of the policy, with learning curve and checkpoint beside it; with
+        --seeds, folder of the policies.
     resume : bool
-        Go on from the checkpoint beside --out; with --seeds, with each unfinished seed.
+        Go on from the checkpoint beside --out; with --seeds, with each
+        unfinished seed.
     overwrite : bool
-        Replace an earlier policy; with --resume, by that of the training that goes on.
+        Replace an earlier policy; with --resume, by that of the training that
+        goes on.
     tensorboard : Path, optional
         Folder for TensorBoard logs.
     """

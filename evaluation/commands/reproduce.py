@@ -27,7 +27,8 @@ class ReproductionRequest(RunningOptions):
     out : Path
         Output folder.
     quick : bool
-        Make a smoke run: every step with trainings of a few iterations, and no verdicts.
+        Make a smoke run: every step with trainings of a few iterations, and no
+        verdicts.
     ppo : bool
         Train with PPO as well, and judge the claims that compare it with ARS.
     """
@@ -61,8 +62,8 @@ class ReproductionRequest(RunningOptions):
     ) -> "Sequence[Claim]":
         """Run the missing trainings, write the results, and return the claims read literally.
 
-        ``executor`` replaces the options about where trainings run; ``command`` is recorded, by
-        default this request.
+        ``executor`` replaces the options about where trainings run; ``command``
+        is recorded, by default this request.
 
         Raises
         ------

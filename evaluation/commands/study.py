@@ -139,8 +139,8 @@ class StudyRequest(RunningOptions):
     def run(self, executor: "Executor | None" = None, command: str | None = None) -> "Study":
         """Run the missing trainings, and write the results.
 
-        ``executor`` replaces the options about where trainings run; ``command`` is recorded, by
-        default this request.
+        ``executor`` replaces the options about where trainings run; ``command``
+        is recorded, by default this request.
 
         Raises
         ------

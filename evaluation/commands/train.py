@@ -51,10 +51,11 @@ class SeedsRequest(Checked):
     Parameters
     ----------
     training : TrainRequest
-        What is trained; ``out`` is the folder of the policies, and there is no ``seed``.
+        What is trained; ``out`` is the folder of the policies, and there is no
+        ``seed``.
     seeds : tuple of int
-        Train several seeds in parallel: a number (5 is 0 to 4) or a range (5-9). One policy for
-        each goes into the folder --out.
+        Train several seeds in parallel: a number (5 is 0 to 4) or a range
+        (5-9). One policy for each goes into the folder --out.
     jobs : int, optional
         Seeds at a time.
     """
@@ -79,16 +80,17 @@ class SeedsRequest(Checked):
     def run(self) -> "tuple[TrainedSeed, ...]":
         """Train, and write a policy and a learning curve for each seed.
 
-        Files are named as ``ars-tuned-both-seed0.npz``. With ``resume``, finished seeds are left
-        as they are, and the others go on or begin. Unfinished ones lie in the folder
-        ``.training``.
+        Files are named as ``ars-tuned-both-seed0.npz``. With ``resume``,
+        finished seeds are left as they are, and the others go on or begin.
+        Unfinished ones lie in the folder ``.training``.
 
         Raises
         ------
         TrainingFailedError
             If trainings failed; all others are finished.
         KinarmError
-            If settings cannot be used, a file cannot be written, or workers end unexpectedly.
+            If settings cannot be used, a file cannot be written, or workers end
+            unexpectedly.
         KeyboardInterrupt
             If it is interrupted; the message says how to go on.
         """

@@ -80,8 +80,9 @@ class RayExecutor:
     Parameters
     ----------
     address : str
-        ``"local"`` for this machine alone, ``"auto"`` for the cluster in ``RAY_ADDRESS`` or else
-        that of this machine, or an address such as ``"10.0.0.1:6379"`` or ``"ray://head:10001"``.
+        ``"local"`` for this machine alone, ``"auto"`` for the cluster in
+        ``RAY_ADDRESS`` or else that of this machine, or an address such as
+        ``"10.0.0.1:6379"`` or ``"ray://head:10001"``.
     jobs : int, optional
         Processors of this machine for ``"local"``; all by default.
     threads : int
@@ -159,7 +160,8 @@ class SlurmExecutor:
     bundle : int
         Tasks of one element of the array, one after the other.
     minutes : int
-        Time limit of an element; after preemption or timeout it goes on where it was.
+        Time limit of an element; after preemption or timeout it goes on where
+        it was.
     threads : int
         Processors of an element.
     partition : str, optional

@@ -23,16 +23,16 @@ MOST_POINTS = 1000
 class CurveTrials(Checked):
     """Separate trials for the learning curves.
 
-    Files then also keep the final distance of every trial at every point of the curve, and the
-    mean return of every iteration.
+    Files then also keep the final distance of every trial at every point of the
+    curve, and the mean return of every iteration.
 
     Parameters
     ----------
     points : int
         Most times that a policy faces the trials during its training.
     spacing : {"even", "geometric"}
-        Spacing of the iterations after which it does, the last included; with geometric spacing
-        also before the first.
+        Spacing of the iterations after which it does, the last included; with
+        geometric spacing also before the first.
     count, seed : int
         Number and seed of the trials.
     """
@@ -62,8 +62,8 @@ class TrialSettings(Checked):
     seed : int
         Seed of the trials.
     per_decade : int
-        How often a policy faces them while its environment steps grow tenfold; 0 for at the end
-        alone.
+        How often a policy faces them while its environment steps grow tenfold;
+        0 for at the end alone.
     first : int
         Environment steps after which it first faces them.
     curve : CurveTrials, optional

@@ -42,8 +42,9 @@ class Executor(Protocol):
     ) -> Iterator[tuple[Any, Any | Failure]]:
         """Do the work for every task, begun in the given order; yield each task with its result.
 
-        Work, tasks and results can be pickled. What the work raises becomes a `Failure`. An
-        abandoned or interrupted executor drops what is not finished.
+        Work, tasks and results can be pickled. What the work raises becomes a
+        `Failure`. An abandoned or interrupted executor drops what is not
+        finished.
 
         Raises
         ------

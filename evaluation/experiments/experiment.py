@@ -49,9 +49,11 @@ class Entry(Checked):
     problems : tuple of str
         Names or files of problems; those of the experiment by default.
     seeds, first_seed : int, optional
-        Trainings with each setting, and the first seed; those of the experiment by default.
+        Trainings with each setting, and the first seed; those of the experiment
+        by default.
     fixed, grid : dict
-        Fixed values of fields, and lists of values, added to those of the experiment.
+        Fixed values of fields, and lists of values, added to those of the
+        experiment.
     """
 
     name: str = field(default="", metadata=OPTIONAL)
@@ -78,16 +80,17 @@ class Entry(Checked):
 class Experiment(Checked):
     """A set of trainings: all combinations of entries, problems, choices and seeds.
 
-    Fields are named as in a recipe (``step_size``, ``reward.success``), those of a problem by path
-    (``problem.task.start_spread``, ``problem.arm``). With a learner in front (``ars.step_size``),
-    they concern that learner alone.
+    Fields are named as in a recipe (``step_size``, ``reward.success``), those
+    of a problem by path (``problem.task.start_spread``, ``problem.arm``). With
+    a learner in front (``ars.step_size``), they concern that learner alone.
 
     Parameters
     ----------
     name : str
         Name of page and folder.
     learners, recipes : tuple of str
-        Names of learners; names or files of recipes, the first of each learner by default.
+        Names of learners; names or files of recipes, the first of each learner
+        by default.
     entries : tuple of Entry
         Used instead of all learners with all recipes.
     problems : tuple of str
@@ -99,13 +102,16 @@ class Experiment(Checked):
     bounds : bool
         Whether to find what any policy could reach in the trials.
     fixed, grid : dict
-        Fixed values of fields, and lists of values, of which all combinations are trained.
+        Fixed values of fields, and lists of values, of which all combinations
+        are trained.
     random : dict
-        ``count`` combinations, drawn by ``seed`` (0), of fields with a list of values, or a table
-        of ``low``, ``high`` and, for an even logarithm, ``log = true``.
+        ``count`` combinations, drawn by ``seed`` (0), of fields with a list of
+        values, or a table of ``low``, ``high`` and, for an even logarithm,
+        ``log = true``.
     search : dict
-        ``count`` combinations that Optuna proposes, by ``seed`` (0) and ``sampler`` (tpe), of
-        fields as in ``random``; ``pruner`` (median) breaks trainings off.
+        ``count`` combinations that Optuna proposes, by ``seed`` (0) and
+        ``sampler`` (tpe), of fields as in ``random``; ``pruner`` (median)
+        breaks trainings off.
     """
 
     name: str
@@ -183,7 +189,8 @@ class Experiment(Checked):
         Raises
         ------
         InvalidInputError
-            If an entry is missing, unknown or wrong; names source, key and what is expected.
+            If an entry is missing, unknown or wrong; names source, key and what
+            is expected.
         """
         made = _prepared(entries, SEVERAL)
         if isinstance(made.get("entries"), list):
@@ -220,7 +227,8 @@ class Experiment(Checked):
         Parameters
         ----------
         entries, problems : iterable of str
-            Names of entries, all by default; names or files of problems, its own by default.
+            Names of entries, all by default; names or files of problems, its
+            own by default.
         seeds : int, optional
             Trainings with each setting.
         """

@@ -41,8 +41,9 @@ TITLES = {
 def write_all(study: "Study", command: str = "") -> Path:
     """Write the results of a study, and return the page.
 
-    The files are ``index.html``, ``RESULTS.md``, ``results.json``, ``runs.csv``, ``curves.csv``,
-    ``runs.parquet`` if pyarrow is there, and the figures; ``command`` is recorded.
+    The files are ``index.html``, ``RESULTS.md``, ``results.json``,
+    ``runs.csv``, ``curves.csv``, ``runs.parquet`` if pyarrow is there, and the
+    figures; ``command`` is recorded.
 
     Raises
     ------

@@ -128,8 +128,8 @@ class TaskResult(NamedTuple):
     Attributes
     ----------
     content, end : bytes
-        Contents of the file of the run, and of that from which a longer one can go on; empty if
-        none can.
+        Contents of the file of the run, and of that from which a longer one can
+        go on; empty if none can.
     clock, iterations : Clock and tuple
         How long it took, and its iterations.
     """

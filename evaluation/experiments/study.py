@@ -39,7 +39,8 @@ class Study:
     Parameters
     ----------
     experiment : Experiment, mapping, str or Path
-        An experiment, what its ``to_json`` returns, the name of a shipped one, or a file.
+        An experiment, what its ``to_json`` returns, the name of a shipped one,
+        or a file.
     folder : str or Path
         Folder of the trainings.
     runs : tuple of Run, optional
@@ -108,13 +109,14 @@ class Study:
     ) -> "Study":
         """Run the missing trainings; after an interruption, the same call goes on.
 
-        A training that fails does not stop the others; the next call tries it again.
+        A training that fails does not stop the others; the next call tries it
+        again.
 
         Parameters
         ----------
         jobs, threads : int
-            Trainings at a time, one a processor by default, and threads of each; neither changes
-            results.
+            Trainings at a time, one a processor by default, and threads of
+            each; neither changes results.
         executor : Executor, optional
             Where trainings run; processes of this machine by default.
         logs : Path, optional
@@ -127,8 +129,8 @@ class Study:
         TrainingFailedError
             If trainings failed; all others are finished.
         KinarmError
-            If the folder is of another experiment or cannot be written to, a package is missing,
-            or workers end unexpectedly.
+            If the folder is of another experiment or cannot be written to, a
+            package is missing, or workers end unexpectedly.
         """
         whole_number("threads", threads, 1)
         jobs = available_threads() if jobs is None else whole_number("jobs", jobs, 1)

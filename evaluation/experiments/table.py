@@ -99,8 +99,8 @@ class Group:
         Returns
         -------
         tuple of float
-            Environment steps, wall time and processor time [s]; infinity for never, NaN for
-            unknown times.
+            Environment steps, wall time and processor time [s]; infinity for
+            never, NaN for unknown times.
         """
         needed = []
         for run in self.runs:

@@ -32,10 +32,11 @@ class Reading:
     Parameters
     ----------
     start_spread : float
-        Share of the joint ranges about home from which starts are drawn, in training and trials.
+        Share of the joint ranges about home from which starts are drawn, in
+        training and trials.
     reward : {"progress", "sign"}
-        Reward of a step: the metres that it brings the tool closer, or 1 or -1 for closer or
-        farther, divided by the horizon.
+        Reward of a step: the metres that it brings the tool closer, or 1 or -1
+        for closer or farther, divided by the horizon.
     sharing : {"none", "pair", "iteration"}
         Which rollouts of an ARS iteration face the same start and goal.
     """

@@ -107,12 +107,14 @@ def find_failures(
     Returns
     -------
     Chosen
-        For `kinarm.viewer.replay_page`; ``runs`` are those of the policies and of the oracle.
+        For `kinarm.viewer.replay_page`; ``runs`` are those of the policies and
+        of the oracle.
 
     Raises
     ------
     KinarmError
-        If a name or number cannot be used, or too few or too many trials failed.
+        If a name or number cannot be used, or too few or too many trials
+        failed.
     """
     found = []
     for policy, problem in product(policies, problems):

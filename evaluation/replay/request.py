@@ -39,17 +39,19 @@ class ReplayRequest(ProblemOptions):
     Parameters
     ----------
     source : Path
-        File to take trials from: evaluation.json of kinarm-eval, or recordings (.npz).
+        File to take trials from: evaluation.json of kinarm-eval, or recordings
+        (.npz).
     policy : str
-        Shipped policy or recipe (its first seed), best, random, zero, oracle, .npz file, folder of
-        them (the first), Stable-Baselines3's model.zip (runs its code: only if you trust it), or
-        module:function.
+        Shipped policy or recipe (its first seed), best, random, zero, oracle,
+        .npz file, folder of them (the first), Stable-Baselines3's model.zip
+        (runs its code: only if you trust it), or module:function.
     compare : tuple of str
         Two policies on the same trials, the second as a ghost.
     trial : tuple of int
         Play this trial; repeatable.
     worst : int
-        Play the trials that ended farthest from their goals, this many; each trial once.
+        Play the trials that ended farthest from their goals, this many; each
+        trial once.
     collisions : bool
         Play the trials that ended in contact.
     failures : bool
@@ -69,7 +71,8 @@ class ReplayRequest(ProblemOptions):
     overwrite : bool
         Replace files that exist.
     live : bool
-        Serve endless fresh trials to the browser of this machine instead of writing a page.
+        Serve endless fresh trials to the browser of this machine instead of
+        writing a page.
     port : int
         Port of --live.
     browser : bool
@@ -155,7 +158,8 @@ class ReplayRequest(ProblemOptions):
         Raises
         ------
         KinarmError
-            If a file, name or number cannot be used, or a file cannot be written.
+            If a file, name or number cannot be used, or a file cannot be
+            written.
         """
         if self.live:
             self._serve(report)

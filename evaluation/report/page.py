@@ -48,8 +48,8 @@ def write_report(
 def report_page(document: EvaluationDocument, evaluations: Sequence[Evaluation]) -> str:
     """The report of an evaluation: one HTML page that fetches nothing.
 
-    It holds the table, profiles, histograms, maps of the benches, the worst trials and how
-    everything was made. Equal input gives equal text.
+    It holds the table, profiles, histograms, maps of the benches, the worst
+    trials and how everything was made. Equal input gives equal text.
 
     Parameters
     ----------

@@ -36,27 +36,29 @@ class ARSConfig(TrainingConfig):
     top_directions : int
         Perturbations b that enter the update, the best ones; b = N is V1 or V2.
     symmetric : bool
-        Whether the policy treats mirror images alike, if arm and obstacles are symmetric; it then
-        learns from goals on the right and mirror images of others.
+        Whether the policy treats mirror images alike, if arm and obstacles are
+        symmetric; it then learns from goals on the right and mirror images of
+        others.
     net_arch : tuple of int
         Widths of hidden layers with tanh; without any, the policy is linear.
     normalize : bool
         Whether observations are normalised (V2) or not (BRS, V1).
     scale_by_deviation : bool
-        Whether the step is divided by the standard deviation of the returns (ARS) or not (BRS).
+        Whether the step is divided by the standard deviation of the returns
+        (ARS) or not (BRS).
     sharing : {"none", "pair", "iteration"}
-        Which policies face the same starts and goals: none, the two signs of a perturbation, or all
-        of an iteration.
+        Which policies face the same starts and goals: none, the two signs of a
+        perturbation, or all of an iteration.
     episodes : int
         Episodes whose mean return judges a perturbed policy.
     replay_share : float
-        Probability of replaying a scenario that half of its policies or more failed; see
-        `kinarm.failed_scenarios`.
+        Probability of replaying a scenario that half of its policies or more
+        failed; see `kinarm.failed_scenarios`.
     replay_size : int
         Failed scenarios that are kept.
     initial_policy : str, optional
-        Name or file of a policy to begin with; it must have the same layers, and may be for another
-        problem or arm.
+        Name or file of a policy to begin with; it must have the same layers,
+        and may be for another problem or arm.
     """
 
     iterations: int = 800

@@ -202,8 +202,8 @@ def top_directions(returns: Array, b: int) -> NDArray[np.int64]:
 def ars_step(config: ARSConfig, delta: Array, returns: Array, step_size: float) -> Array:
     """Update of theta: alpha / (b sigma_R) times the sum of (r+ - r-) delta over the top b.
 
-    sigma_R is the population standard deviation of all returns (paper, section 2.1); the step is
-    zero when all returns tie.
+    sigma_R is the population standard deviation of all returns (paper, section
+    2.1); the step is zero when all returns tie.
 
     Parameters
     ----------

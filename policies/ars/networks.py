@@ -53,8 +53,8 @@ def initial_network(rng: np.random.Generator, deviations: Array, widths: Sequenc
     rng : numpy.random.Generator
         Draws the other weights, normal numbers.
     deviations : ndarray, shape (n_observations,)
-        Standard deviations of the first layer's weights by input; in others, one over the root of
-        the inputs.
+        Standard deviations of the first layer's weights by input; in others,
+        one over the root of the inputs.
     widths : sequence of int
         Widths of the layers after the observation.
 

@@ -159,7 +159,8 @@ def module_pieces(module: Any) -> Iterator[Piece]:
 def normalization(statistics: Any, sizes: Mapping[str, int]) -> Iterator[Piece]:
     """The map by ``VecNormalize``: (x - mean) / sqrt(var + epsilon), and a clip.
 
-    It has statistics of some parts of the inputs, whose sizes are given in order.
+    It has statistics of some parts of the inputs, whose sizes are given in
+    order.
 
     Raises
     ------

@@ -75,8 +75,8 @@ def policy_from_sb3(
     given : BaseAlgorithm, str or Path
         The model, or its file.
     problem, vec_normalize
-        The problem of the policy, and the ``VecNormalize`` of its observations, or its file; None
-        for those of the model's environment.
+        The problem of the policy, and the ``VecNormalize`` of its observations,
+        or its file; None for those of the model's environment.
 
     Raises
     ------
@@ -224,8 +224,8 @@ def _algorithm_of(family: str, data: Mapping[str, Any]) -> str:
 def model_inputs(policy: Any, simulator: Simulator) -> tuple[Interface, Layer, dict[str, int]]:
     """Find out how a features extractor puts its inputs together.
 
-    Returned are the interface of the model's environment, the map from the flat observation to the
-    inputs, and the sizes of their parts in order.
+    Returned are the interface of the model's environment, the map from the flat
+    observation to the inputs, and the sizes of their parts in order.
 
     Raises
     ------

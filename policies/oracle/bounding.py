@@ -46,8 +46,8 @@ class Prover:
     ) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
         """Prove how many steps it takes at least to reach goals.
 
-        Returned are lower bounds for the ``rows``, and whether a configuration that counts attains
-        them, or none reaches the goal in ``most``.
+        Returned are lower bounds for the ``rows``, and whether a configuration
+        that counts attains them, or none reaches the goal in ``most``.
 
         Parameters
         ----------
@@ -99,7 +99,8 @@ class Prover:
     ) -> tuple[Array, Array]:
         """Bound how close the tool can come to goals, whatever it touches.
 
-        Returned are distances proven and found, shape (n, 2) [m], and configurations.
+        Returned are distances proven and found, shape (n, 2) [m], and
+        configurations.
 
         Parameters
         ----------

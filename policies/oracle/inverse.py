@@ -33,8 +33,8 @@ def inverse_kinematics(
 ) -> Array:
     """Find distinct contact-free configurations at a goal within the horizon.
 
-    Evenly spread configurations and the current one are moved into the ball about the goal by
-    damped least squares within the limits.
+    Evenly spread configurations and the current one are moved into the ball
+    about the goal by damped least squares within the limits.
 
     Parameters
     ----------
@@ -127,7 +127,8 @@ def project(
 ) -> tuple[Array, Array]:
     """Move configurations towards goals by damped least squares.
 
-    Returns where they end [rad or m], and distances from tool to goal [m]. Contact is ignored.
+    Returns where they end [rad or m], and distances from tool to goal [m].
+    Contact is ignored.
 
     Parameters
     ----------
@@ -136,9 +137,11 @@ def project(
     configurations : ndarray, shape (k, n_joints)
         Where they begin [rad or m].
     owner, radius : ndarray of int and of float, shape (k,)
-        Row of box and goals for each, and how far from the goal it may rest [m].
+        Row of box and goals for each, and how far from the goal it may rest
+        [m].
     box, goals : tuple of ndarray, shape (m, n_actions), and ndarray, shape (m, 3)
-        Lower and upper corners of their limits [rad or m], and goal positions [m].
+        Lower and upper corners of their limits [rad or m], and goal positions
+        [m].
     """
     ended, distances = configurations.copy(), np.empty(len(configurations))
     arrays = (simulator.world.records[0], owner, *box, goals, radius, ended, distances)
@@ -178,7 +181,8 @@ def step_box(simulator: Simulator, starts: Array, steps: NDArray[np.int64]) -> t
 def steps_between(simulator: Simulator, first: Array, second: Array) -> Array:
     """Steps of the straight motion between configurations, before rounding up.
 
-    The slowest joint decides: the largest of |dq_i| / (rate_i dt) over the actuated joints.
+    The slowest joint decides: the largest of |dq_i| / (rate_i dt) over the
+    actuated joints.
 
     Parameters
     ----------

@@ -35,8 +35,8 @@ MISS_COST = 1000.0
 class MotionSearch:
     """The best motions found so far for some trials.
 
-    Reaching the goal costs the steps taken, missing it more, and contact is ruled out. The outcome
-    in the simulator counts.
+    Reaching the goal costs the steps taken, missing it more, and contact is
+    ruled out. The outcome in the simulator counts.
 
     Attributes
     ----------
@@ -47,8 +47,8 @@ class MotionSearch:
     costs : ndarray, shape (n,)
         Their costs; infinite where there is none.
     solved : ndarray of int, shape (n,)
-        Fewest steps to a contact-free configuration at the goal, with or without a motion; the
-        horizon + 1 if none was found.
+        Fewest steps to a contact-free configuration at the goal, with or
+        without a motion; the horizon + 1 if none was found.
     """
 
     def __init__(self, simulator: Simulator, starts: Array, goals: Array) -> None:
@@ -258,8 +258,8 @@ def find_detour(
 ) -> Array | None:
     """Find a contact-free path of straight segments to one of several ends.
 
-    Two trees grow in turns until they meet. The path has the shape (m, n_joints); None if none was
-    found.
+    Two trees grow in turns until they meet. The path has the shape (m,
+    n_joints); None if none was found.
 
     Parameters
     ----------

@@ -1,14 +1,16 @@
 """The oracle: bounds of what any policy could reach, and in how many steps.
 
-For each trial it *proves* bounds and *finds* a motion; the best policy lies between them.
+For each trial it *proves* bounds and *finds* a motion; the best policy lies
+between them.
 
-Proven, by branch and bound over all configurations within reach: the fewest steps in which any
-policy can bring the tool within the tolerance of the goal; and, where none can within the horizon,
-a distance that no policy can beat, to a millimetre if the budget suffices. Both ignore contact, and
-hold with it all the more. Where the motion found is slower, contact raises the bound: no motion
-ends where the arm touches something, as far as its shapes are capsules. Boxes and distances are
-enlarged by 1e-9 to cover rounding. When a budget runs out, what is proven stands, marked as
-incomplete.
+Proven, by branch and bound over all configurations within reach: the fewest
+steps in which any policy can bring the tool within the tolerance of the goal;
+and, where none can within the horizon, a distance that no policy can beat, to a
+millimetre if the budget suffices. Both ignore contact, and hold with it all the
+more. Where the motion found is slower, contact raises the bound: no motion ends
+where the arm touches something, as far as its shapes are capsules. Boxes and
+distances are enlarged by 1e-9 to cover rounding. When a budget runs out, what
+is proven stands, marked as incomplete.
 
 Found, by search, and replayed in the simulator: a contact-free motion to the goal. It need not be
 the fastest, and finding none proves nothing.
@@ -44,7 +46,8 @@ Progress = Callable[[int, int], object]
 class Oracle:
     """Bounds what any policy could do in given trials.
 
-    A result does not depend on other trials, their order or the number of threads.
+    A result does not depend on other trials, their order or the number of
+    threads.
 
     Parameters
     ----------
@@ -186,15 +189,18 @@ class OracleSolution:
     steps : int
         Steps of the motion; the horizon if it does not reach the goal.
     steps_lower_bound : int
-        Proven: no motion reaches the goal in fewer steps. The horizon + 1 if it is out of reach.
+        Proven: no motion reaches the goal in fewer steps. The horizon + 1 if it
+        is out of reach.
     proof_complete : bool
-        Whether a configuration at the goal, not proven to touch anything, is that many steps away,
-        the motion takes as many, or the goal is proven to be out of reach. Else the budget ran out.
-        Contact on the way may make ``steps`` larger.
+        Whether a configuration at the goal, not proven to touch anything, is
+        that many steps away, the motion takes as many, or the goal is proven to
+        be out of reach. Else the budget ran out. Contact on the way may make
+        ``steps`` larger.
     final_distance : float
         Distance from tool to goal at the end of the motion [m].
     distance_lower_bound : float
-        Proven: no motion within the horizon ends closer [m]. Zero if one reaches the goal.
+        Proven: no motion within the horizon ends closer [m]. Zero if one
+        reaches the goal.
     path : ndarray, shape (steps + 1, n_joints)
         Configurations of the motion in the simulator [rad or m].
     actions : ndarray, shape (steps, n_actions)

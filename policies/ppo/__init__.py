@@ -24,8 +24,9 @@ SETTLED = 0.9
 class PPOConfig(TrainingConfig):
     """Settings of a training of 1.2 million environment steps, as in the paper.
 
-    The paper gives no others. Names and defaults are those of Stable-Baselines3. For speed, 16
-    environments fill the rollouts of 2000 steps, and minibatches are larger.
+    The paper gives no others. Names and defaults are those of
+    Stable-Baselines3. For speed, 16 environments fill the rollouts of 2000
+    steps, and minibatches are larger.
 
     Parameters
     ----------
@@ -62,25 +63,29 @@ class PPOConfig(TrainingConfig):
     log_std_init : float
         Initial logarithm of the standard deviation of the actions.
     final_log_std : float, optional
-        Final logarithm of the standard deviation, which changes linearly; without it, PPO learns
-        it.
+        Final logarithm of the standard deviation, which changes linearly;
+        without it, PPO learns it.
     training_tolerance : float, optional
-        Distance that counts as a success in the training [m]; by default the task's tolerance.
+        Distance that counts as a success in the training [m]; by default the
+        task's tolerance.
     initial_tolerance : float, optional
-        Training tolerance until start spread and discount are final; then it changes geometrically
-        [m].
+        Training tolerance until start spread and discount are final; then it
+        changes geometrically [m].
     stop_at_goal : bool
-        Whether success in the training takes two steps in a row within the tolerance, so that the
-        hand stops at the goal. At the last step, one is enough.
+        Whether success in the training takes two steps in a row within the
+        tolerance, so that the hand stops at the goal. At the last step, one is
+        enough.
     symmetric : bool
-        Whether the policy treats mirror images alike, if arm and obstacles are symmetric; it then
-        learns from goals on the right and mirror images of others.
+        Whether the policy treats mirror images alike, if arm and obstacles are
+        symmetric; it then learns from goals on the right and mirror images of
+        others.
     initial_start_spread : float
         Initial spread of the start configurations, as a share of the task's.
     initial_gamma : float, optional
         Initial discount per step; by default ``gamma``.
     initial_penalty : float
-        Share of the penalty for contact that counts at first; it grows linearly to the whole.
+        Share of the penalty for contact that counts at first; it grows linearly
+        to the whole.
     widening : float
         Share of the training in which spread and discount change linearly.
     replay_share : float
@@ -89,13 +94,14 @@ class PPOConfig(TrainingConfig):
     replay_size : int
         Failed scenarios that are kept.
     replay_log_std : float, optional
-        Smallest logarithm of the standard deviation in replayed episodes: with less noise, a policy
-        never succeeds where it always fails. By default there is none.
+        Smallest logarithm of the standard deviation in replayed episodes: with
+        less noise, a policy never succeeds where it always fails. By default
+        there is none.
     replay_noise_steps : int, optional
         First steps of a replayed episode that have that noise; by default all.
     initial_policy : str, optional
-        Name or file of a policy to begin with; it must have the same layers, and may be for another
-        problem or arm.
+        Name or file of a policy to begin with; it must have the same layers,
+        and may be for another problem or arm.
     demonstrations : int
         Trials that the oracle solves first; the actor imitates its motions.
     """

@@ -18,8 +18,9 @@ from kinarm.policies.ppo.networks import ActorCritic
 class TrainingArms:
     """Arms stepped together, whose episodes are replaced when they end.
 
-    With a mirror, new goals on the left are reflected, so that a learner only meets those on the
-    right. To stop at the goal, a success takes two steps in a row within the tolerance.
+    With a mirror, new goals on the left are reflected, so that a learner only
+    meets those on the right. To stop at the goal, a success takes two steps in
+    a row within the tolerance.
 
     Parameters
     ----------
@@ -33,8 +34,9 @@ class TrainingArms:
     returns, successes : list of ndarray
         Of episodes that ended since `restore`, but for replays.
     cut_short, finals : list of ndarray
-        Of each step since `restore`, rows of episodes that the time limit cut short, shape (n,),
-        and their last observations, shape (n, n_observations).
+        Of each step since `restore`, rows of episodes that the time limit cut
+        short, shape (n,), and their last observations, shape (n,
+        n_observations).
     time : float
         Time that steps took since `restore` [s].
     """
@@ -154,8 +156,8 @@ def collect(
 ) -> Experience:
     """Step the arms, then judge all steps at once.
 
-    An episode that the time limit cut short would go on: its last reward gets the value of its last
-    observation.
+    An episode that the time limit cut short would go on: its last reward gets
+    the value of its last observation.
 
     Parameters
     ----------

@@ -48,7 +48,8 @@ class PPOTraining:
     tensorboard : str or Path, optional
         Folder of the logs.
     threads : int, optional
-        Threads of an update; by default as many as processors. The result does not depend on them.
+        Threads of an update; by default as many as processors. The result does
+        not depend on them.
     """
 
     def __init__(

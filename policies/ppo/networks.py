@@ -124,8 +124,8 @@ class ActorCritic:
     Attributes
     ----------
     weights : ndarray of float32, shape (n_weights,)
-        Matrices (inputs x outputs) and biases, their rows padded with zeros, and the logarithms of
-        the standard deviations.
+        Matrices (inputs x outputs) and biases, their rows padded with zeros,
+        and the logarithms of the standard deviations.
     actor, critic : Network
         The networks.
     log_std : ndarray of float32, shape (n_actions,)

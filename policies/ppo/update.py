@@ -58,7 +58,8 @@ def update(
 ) -> UpdateRecords:
     """Change networks and moments by the experience of a rollout.
 
-    Gradients of parts are added up in a fixed order, so that the result does not depend on threads.
+    Gradients of parts are added up in a fixed order, so that the result does
+    not depend on threads.
 
     Parameters
     ----------
@@ -127,8 +128,8 @@ def logged(
 def find_gradients(threads: int, *given: Any) -> None:
     """Call ``add_gradients(part, part + 1, *given)`` for `PARTS` parts, on threads.
 
-    The calling thread works, too, and does not wait for one that has not begun: processors may be
-    busy.
+    The calling thread works, too, and does not wait for one that has not begun:
+    processors may be busy.
 
     Parameters
     ----------

@@ -46,9 +46,11 @@ class SB3Config(TrainingConfig):
     n_envs : int
         Arms that are simulated at once.
     training_tolerance : float, optional
-        Distance that counts as a success in the training [m]; by default the task's tolerance.
+        Distance that counts as a success in the training [m]; by default the
+        task's tolerance.
     hindsight : bool
-        Whether it learns in the goal-conditioned environment, with hindsight replay.
+        Whether it learns in the goal-conditioned environment, with hindsight
+        replay.
     normalize : bool
         Whether running statistics normalise observations.
     action_noise : float
@@ -56,7 +58,8 @@ class SB3Config(TrainingConfig):
     learning_rate_schedule : {"constant", "linear"}
         Whether the learning rate stays or falls linearly to zero.
     hyperparameters : dict
-        Arguments of the algorithm's class, as in TOML; others have the library's defaults.
+        Arguments of the algorithm's class, as in TOML; others have the
+        library's defaults.
     """
 
     algorithm: str

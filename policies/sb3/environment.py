@@ -42,16 +42,19 @@ def sb3_vec_env(
     ----------
     problem : ReachProblem, str or Path
         As for `kinarm.ReachEnv`; or the id of an environment, such as
-        ``"kinarm/ReachRight-v0"`` or, goal-conditioned, ``"kinarm/ReachGoalRight-v0"``.
+        ``"kinarm/ReachRight-v0"`` or, goal-conditioned,
+        ``"kinarm/ReachGoalRight-v0"``.
     n_envs, seed : int
         Number of arms, and seed, which a learner's own ``seed`` replaces.
     observation_dtype, reward_type : str, optional
-        As for `kinarm.ReachGoalEnv`; a reward type makes any problem goal-conditioned.
+        As for `kinarm.ReachGoalEnv`; a reward type makes any problem
+        goal-conditioned.
     threads : int, optional
         As for `kinarm.Simulator`.
     replay_share, replay_size : float and int
-        Probability that an episode begins where one of the last ``replay_size`` failures did, told
-        by infos (``replayed``). Evaluate policies without it.
+        Probability that an episode begins where one of the last ``replay_size``
+        failures did, told by infos (``replayed``). Evaluate policies without
+        it.
     render_mode, width, height, camera
         As for `kinarm.ReachEnv`.
     **overrides
@@ -98,7 +101,8 @@ def zoo_hyperparameters(algorithm: str) -> Path:
     Parameters
     ----------
     algorithm : str
-        As rl-zoo3 names it: ``"ppo"``, ``"a2c"``, ``"sac"``, ``"td3"`` or ``"tqc"``.
+        As rl-zoo3 names it: ``"ppo"``, ``"a2c"``, ``"sac"``, ``"td3"`` or
+        ``"tqc"``.
 
     Raises
     ------

@@ -84,13 +84,14 @@ class SB3VecEnv(Lifecycle, VecEnv):
     def restore_failed(self, starts: ArrayLike, goals: ArrayLike) -> None:
         """Replay the `failed` scenarios of an earlier environment instead.
 
-        A reset with a seed goes back to them: the same seed gives the same episodes.
+        A reset with a seed goes back to them: the same seed gives the same
+        episodes.
 
         Parameters
         ----------
         starts, goals : array_like, shape (n, n_joints) and (n, 3)
-            Configurations [rad or m] and positions [m], oldest first; the last ``replay_size`` are
-            kept.
+            Configurations [rad or m] and positions [m], oldest first; the last
+            ``replay_size`` are kept.
         """
         if not self._share:
             raise InvalidInputError("failed scenarios need an environment with a replay_share")

@@ -129,35 +129,38 @@ def search(
 ) -> tuple[bool, int, float, float]:
     """Search a box for the configuration with the fewest steps to a goal, or the closest.
 
-    With an infinite resolution, the search is for one close enough to the goal in the fewest steps
-    from the start. Else it is for the closest one, whose distance may exceed what is proven by the
-    resolution.
+    With an infinite resolution, the search is for one close enough to the goal
+    in the fewest steps from the start. Else it is for the closest one, whose
+    distance may exceed what is proven by the resolution.
 
     Parameters
     ----------
     chain, bounds, shapes
         The arm, bounds of its motion, and what may touch.
     start, goal, step_limit
-        The arm's start, shape (n_joints,), the goal [m], and moves in a step, shape (n,).
+        The arm's start, shape (n_joints,), the goal [m], and moves in a step,
+        shape (n,).
     fewest, most : int
         Range of the steps.
     enough, resolution : float
-        Distance from the goal that is close enough, and difference that matters [m].
+        Distance from the goal that is close enough, and difference that matters
+        [m].
     contact, budget : bool and int
         Whether to rule out what is proven to touch; boxes examined at most.
     lower, upper : ndarray, shape (n,)
-        The box of the first n joints [rad or m]; in a search for the fewest steps, filled in, and
-        smaller with every configuration found.
+        The box of the first n joints [rad or m]; in a search for the fewest
+        steps, filled in, and smaller with every configuration found.
     best : ndarray, shape (n_joints,)
-        Filled with the configuration found; joints beyond the n-th stay as at the start.
+        Filled with the configuration found; joints beyond the n-th stay as at
+        the start.
     stack, block : ndarray, shape (WAITING, 2 n + 1), and Boxes
         Work space.
 
     Returns
     -------
     complete, steps : bool and int
-        Whether it is proven that there is nothing better, and the steps of the configuration found;
-        more than ``most`` if there is none.
+        Whether it is proven that there is nothing better, and the steps of the
+        configuration found; more than ``most`` if there is none.
     distance, proven : float
         Of the closest configuration found, and a lower bound over the box [m].
     """

@@ -1,15 +1,18 @@
 """Proofs for a box of configurations: distance from a goal, and contact.
 
-A box has a centre c and half-widths h. With any unit vector u, the tool p and the goal g,
+A box has a centre c and half-widths h. With any unit vector u, the tool p and
+the goal g,
 
     |p(c + e) - g|  >=  u . (p(c) - g) + sum_i u . J_i e_i + 1/2 sum_ij u . H_ij e_i e_j - R
 
-for all |e_i| <= h_i, with the Jacobian J and the second derivatives H of the tool, and a bound R of
-what is of third order. A second bound needs no tool: the origin of the k-th joint moves no farther
-than its swing, and the tool is no farther from it than its length.
+for all |e_i| <= h_i, with the Jacobian J and the second derivatives H of the
+tool, and a bound R of what is of third order. A second bound needs no tool: the
+origin of the k-th joint moves no farther than its swing, and the tool is no
+farther from it than its length.
 
-Two points, of the axes of bodies or of obstacle or ground, prove contact throughout a box if they
-stay closer than the radii. Bodies that are only enclosed by a capsule prove nothing.
+Two points, of the axes of bodies or of obstacle or ground, prove contact
+throughout a box if they stay closer than the radii. Bodies that are only
+enclosed by a capsule prove nothing.
 
 No branch depends on values, so that lanes may hold a box each.
 """

@@ -98,7 +98,8 @@ def damped_least_squares(
     lower, upper, goals : ndarray, shape (n_goals, n) twice and (n_goals, 3)
         Limits of the first n joints, the others stay [rad or m]; goals [m].
     configurations, distances : ndarray, shape (n_rows, n_joints) and (n_rows,)
-        Changed: joint positions [rad or m], and distances from tool to goal [m].
+        Changed: joint positions [rad or m], and distances from tool to goal
+        [m].
     """
     tool, rows = chain.tool, moving.rows
     n_joints, aim = configurations.shape[1], moving.goal[0]

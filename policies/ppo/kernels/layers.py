@@ -219,8 +219,8 @@ def backward(
     Parameters
     ----------
     network, rows, work
-        As for `forward`; derivatives replace outputs: those of the network before the call, those
-        of the other layers in it.
+        As for `forward`; derivatives replace outputs: those of the network
+        before the call, those of the other layers in it.
     samples : int
         The number of samples that count.
     behind : ndarray of float32

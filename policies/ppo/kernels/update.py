@@ -92,8 +92,8 @@ def choose(
     noisy, least : ndarray of bool, shape (n,), and float
         Rows where the mean logarithm is at least so large.
     scales, densities : ndarray of float32, shape (n,)
-        Factors on the standard deviations, and logarithms of the densities of the deviations over
-        the scales.
+        Factors on the standard deviations, and logarithms of the densities of
+        the deviations over the scales.
     """
     precision = np.zeros(means.shape[1])
     find_precision(log_std, precision)
@@ -143,8 +143,8 @@ def add_gradients(
     first, last : int
         Which parts.
     actor, critic : Network
-        Networks whose parameters lie in one array; its last entries, padded, are the logarithms of
-        the standard deviations.
+        Networks whose parameters lie in one array; its last entries, padded,
+        are the logarithms of the standard deviations.
     chosen : ndarray of int, shape (batch_size,)
         Rows of the minibatch.
     standard : tuple of float
