@@ -1,4 +1,4 @@
-"""Evaluation: trials that every policy faces alike, statistics, figures and command lines."""
+"""Evaluation: trials that every policy faces alike, statistics and commands."""
 
 import lazy_loader
 

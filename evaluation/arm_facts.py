@@ -16,12 +16,12 @@ from kinarm.scene import Scene
 
 
 def contact_on_bare_ground(arm: Arm) -> ContactModel:
-    """The pairs of bodies that are tested for contact where nothing stands but the arm."""
+    """The pairs of bodies tested for contact where only the arm stands."""
     return ContactModel.build(arm, Scene(obstacles=(), goal_regions=()))
 
 
 def joint_speeds(arm: Arm) -> str:
-    """Slowest and fastest joint that is actuated [deg/s, or m/s]."""
+    """Slowest and fastest actuated joint [deg/s, or m/s]."""
     speeds = arm.velocity_limits[: arm.n_actuated]
     return _span(np.sort(speeds)[[0, -1]], bool(arm.chain.prismatic.any()))
 
@@ -41,7 +41,7 @@ def untested_pairs(contact: ContactModel) -> Iterator[tuple[str, str, str]]:
 
 
 def arm_facts(arm: Arm) -> str:
-    """All of it, as lines under headings."""
+    """All facts, as lines under headings."""
     contact, file = contact_on_bare_ground(arm), ArmFile.of(arm.specification.source)
     shapes = (_shape(each.geometry) for each in arm.geometry.geometryObjects)
     environment = template_environment()
@@ -65,7 +65,7 @@ def _shape(shape: coal.CollisionGeometry) -> str:
 
 
 def _span(values: NDArray[np.float64] | list[float], prismatic: bool) -> str:
-    """Positions or speeds as people read them: metres, or degrees; equal ones once."""
+    """Positions or speeds as text, in metres or degrees; equal ones once."""
     numbers = np.asarray(values, dtype=np.float64)
     shown = np.round(numbers, 2) if prismatic else np.round(np.rad2deg(numbers))
     return " to ".join(dict.fromkeys(f"{value:g}" for value in shown))

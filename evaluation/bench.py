@@ -1,4 +1,4 @@
-"""How fast everything is on this machine: rates, times and memory of what users run."""
+"""Rates, times and memory of what users run, on this machine."""
 
 import math
 import os
@@ -30,15 +30,15 @@ from kinarm.simulator import Simulator
 
 BATCHES = (48, 512, 4096)
 HEADLINE_BATCH = 512
-"""Batch whose trained rollouts on all threads are compared with the reference path."""
+"""Batch that is compared with the reference path, trained and on all threads."""
 SLOW_REPETITIONS = 3
-"""How often, at most, is measured what takes seconds."""
+"""Most repetitions of what takes seconds."""
 REFERENCE_TRIALS, ORACLE_TRIALS = 24, 200
 VECTOR_ENVS, VECTOR_STEPS, SINGLE_STEPS = 64, 200, 2000
 
 
 def timed(run: Callable[[], int], repetitions: int) -> dict[str, float]:
-    """Median and best rate [1/s] of something that returns its steps; a first run warms it up."""
+    """Median and best rate [1/s] of what returns its steps, after a first run."""
     run()
     rates = []
     for _ in range(repetitions):
@@ -49,14 +49,14 @@ def timed(run: Callable[[], int], repetitions: int) -> dict[str, float]:
 
 
 def measure(policy_name: str, repetitions: int, *, ppo: bool = False) -> dict[str, Any]:
-    """Measure everything: rates [1/s], shares, times [s] and memory [MB], as JSON can hold them.
+    """Measure everything: rates [1/s], shares, times [s] and memory [MB], as JSON holds them.
 
     Parameters
     ----------
     policy_name : str
         Trained policy to run, on the problem that it is for.
     repetitions, ppo : int, bool
-        How often each figure is measured, and whether to time a training with PPO as well.
+        How often to measure, and whether to time a training with PPO.
     """
     policy = load_policy(policy_name)
     problem = policy.problem
@@ -91,7 +91,7 @@ def measure(policy_name: str, repetitions: int, *, ppo: bool = False) -> dict[st
 def measure_rollouts(
     simulator: Simulator, policy: Policy, batch: int, repetitions: int
 ) -> list[dict[str, Any]]:
-    """Steps per second of whole episodes: random and trained, on one and on all threads.
+    """Steps per second of episodes: random and trained, on one and all threads.
 
     Parameters
     ----------
@@ -121,7 +121,7 @@ def measure_rollouts(
 
 
 def reference_steps(simulator: Simulator, policy: Policy) -> int:
-    """Steps of some episodes of a policy on the slow reference path, with Pinocchio and Coal."""
+    """Steps of some episodes on the slow reference path."""
     reference = ReferenceSimulator(simulator)
     starts, goals = simulator.sample(np.random.default_rng(0), REFERENCE_TRIALS)
     episodes = [reference.rollout(policy, *pair) for pair in zip(starts, goals, strict=True)]
@@ -131,14 +131,14 @@ def reference_steps(simulator: Simulator, policy: Policy) -> int:
 def measure_env(
     env: ReachEnv | ReachVectorEnv, shape: tuple[int, ...], repetitions: int
 ) -> dict[str, float]:
-    """Steps per second of all arms of an environment without wrappers, on random actions.
+    """Steps per second of all arms of an environment, on random actions.
 
     Parameters
     ----------
     env, repetitions : ReachEnv or ReachVectorEnv, int
-        What to step, and how often each measurement is repeated.
+        What to step, and how often to measure.
     shape : tuple of int
-        Steps of a measurement, and the number of arms if they are stepped together.
+        Steps of a measurement, and the number of arms of a vector environment.
     """
     env.reset(seed=0)
     actions = np.random.default_rng(0).uniform(-1, 1, (*shape, env.simulator.n_actions))
@@ -189,13 +189,13 @@ run = [sys.executable, "-P", "-m", *sys.argv[1:]]
 subprocess.run(run, stdout=subprocess.DEVNULL, check=True)
 print(resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss)
 """
-"""A small process in between: the peak memory of another one counts that which started it."""
+"""A small process in between: peak memory counts that of the parent."""
 
 
 def measure_evaluation() -> dict[str, float]:
     """Time [s] and peak memory [MB] of ``kinarm-eval --trials 200`` as its own process.
 
-    The first time, nothing is compiled; then the bounds of the trials are not known; then they are.
+    First nothing is compiled; then the bounds of the trials are unknown; then they are known.
     """
     command = ("kinarm", "eval", "--trials", "200", "--json")
     with tempfile.TemporaryDirectory() as compiled, tempfile.TemporaryDirectory() as bounds:
@@ -212,7 +212,7 @@ def measure_evaluation() -> dict[str, float]:
 
 
 def _time_and_memory(command: Iterable[str], env: Mapping[str, str]) -> tuple[float, float]:
-    """Time [s] and peak memory [MB] of a module as a process of its own."""
+    """Time [s] and peak memory [MB] of a module as its own process."""
     began = time.perf_counter()
     done = subprocess.run(
         [sys.executable, "-c", RUN_AND_TELL, *command],

@@ -1,4 +1,4 @@
-"""Bounds of what any policy could do in a set of trials, kept in the user's cache folder."""
+"""Bounds of what any policy could do, kept in the user's cache folder."""
 
 import hashlib
 import os
@@ -20,36 +20,38 @@ from kinarm.policies.oracle import ORACLE_SEMANTICS, Oracle, OracleSolutions, Pr
 from kinarm.policies.provenance import package_versions
 
 KEPT_BYTES = 256 * 2**20
-"""How large the files with kept bounds may be together."""
+"""Largest total size of the files with kept bounds."""
 
 COMPUTING_PACKAGES = ("numpy", "numba", "pin", "coal")
-"""Packages that the numbers of a solution come from."""
+"""Packages that solutions depend on."""
 
 ARCHIVE = ("bounds", 1)
 """Kind and version of the files."""
 
 MOST_BOUNDED = 2000
-"""Trials whose bounds are looked for beside policies that face more: the first ones.
+"""Most trials that are bounded beside policies that face more, the first ones.
 
-A proof takes a thousand times as long as a policy's trial, and figures need no more of them.
+A proof takes a thousand times as long as a policy's trial.
 """
 
 _known: WeakKeyDictionary[TrialSet, OracleSolutions] = WeakKeyDictionary()
 
 
 def oracle_bounds(trials: TrialSet, on_progress: Progress | None = None) -> OracleSolutions:
-    """Find what the oracle knows about a set of trials: look it up, or solve and keep it.
+    """Look up what the oracle knows about trials, or solve and keep it.
 
-    Solutions are kept in the cache folder, under the hash of the trials and of the oracle's
-    version, and in memory as long as the trials are. A file that cannot be read is replaced; where
-    none can be written, nothing is kept. Beyond ``KEPT_BYTES``, what was used least recently goes.
+    Solutions are kept in the cache folder, under the hash of the trials and of
+    the oracle's version, and in memory as long as the trials are. An unreadable
+    file is replaced; where none can be written, nothing is kept. Beyond
+    ``KEPT_BYTES``, what was used least recently goes.
 
     Parameters
     ----------
     trials : TrialSet
         The trials.
     on_progress : callable, optional
-        Called with the number of trials solved so far and in all, unless they are known.
+        Called with the number of trials solved so far and in all, unless they
+        are known.
     """
     if trials not in _known:
         path = cache_folder() / f"oracle-{trials.digest}-{oracle_version()}.npz"
@@ -64,7 +66,7 @@ def oracle_bounds(trials: TrialSet, on_progress: Progress | None = None) -> Orac
 
 @cache
 def oracle_version() -> str:
-    """Hash of the versions of oracle, simulator and packages that solutions depend on."""
+    """Hash of the versions that solutions depend on."""
     packages = package_versions()
     versions = (ORACLE_SEMANTICS, SEMANTICS, *(packages[name] for name in COMPUTING_PACKAGES))
     return hashlib.sha256(" ".join(versions).encode()).hexdigest()[:12]
@@ -82,7 +84,7 @@ def _load(path: Path) -> OracleSolutions | None:
 
 
 def _save(path: Path, solutions: OracleSolutions) -> None:
-    """Write solutions, if possible, and delete what was used least recently, also half-written."""
+    """Write solutions, if possible, and delete the least recently used."""
     with suppress(OutputError, OSError):
         check_folder(path.parent)
         save_archive(path, *ARCHIVE, vars(solutions), {}, compress=True)
@@ -107,9 +109,10 @@ class TrialBounds(Document, frozen=True, kw_only=True):
     Parameters
     ----------
     steps, steps_lower_bound : list of int
-        Steps of the motion that was found, and those that are proven to be necessary.
+        Steps of the motion that was found, and steps proven necessary.
     final_distance, distance_lower_bound : list of float
-        How close the motion comes, and no motion within the horizon comes closer [m].
+        How close the motion comes, and no motion within the horizon comes
+        closer [m].
     """
 
     reachable: list[bool]
@@ -130,8 +133,8 @@ class Bounds(Document, frozen=True, kw_only=True):
     success : Estimate
         Share of trials with a motion to the goal.
     steps, steps_lower_bound, gap : dict of float
-        Mean, median, 95th percentile and maximum: of the motions, of the bounds, and of their
-        difference in trials with a motion.
+        Mean, median, 95th percentile and maximum: of the motions, of the
+        bounds, and of their difference in trials with a motion.
     """
 
     bounded: Count

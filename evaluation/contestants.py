@@ -1,4 +1,4 @@
-"""Who takes part in an evaluation: trained policies and baselines."""
+"""Contestants of an evaluation: trained policies and baselines."""
 
 import inspect
 import re
@@ -32,33 +32,34 @@ NEVER = sys.float_info.min
 """A tolerance that nothing meets [m]."""
 
 AIM = 0.005
-"""How close the oracle's motions are to come where success does not end trials [m]."""
+"""How close the oracle aims where success does not end trials [m]."""
 
 
 class Predictor(Protocol):
-    """Something that chooses actions as models of Stable-Baselines3 do."""
+    """What chooses actions as models of Stable-Baselines3 do."""
 
     @property
     def predict(self) -> Callable[..., Any]:
-        """From observations, shape (n, n_observations), to actions, or to actions and a state."""
+        """From observations, (n, n_observations), to actions, perhaps with a state."""
 
 
 @dataclass(frozen=True, eq=False)
 class Contestant:
-    """Something that can be put to the trials.
+    """Something that can face trials.
 
     Attributes
     ----------
     name : str
         Name in tables.
     run : callable
-        Runs all trials of a set; with ``record``, it keeps the configurations visited.
+        Runs a set of trials; with ``record``, it keeps the configurations
+        visited.
     algorithm, recipe, seed : str, str, int or None
         How it was made, and its training seed.
     policy, source : Policy or None, Path or None
-        The trained policy, if it is one, and the file that it was read from.
+        The trained policy, if it is one, and its file.
     best_for : tuple of ReachProblem
-        What it was chosen for as the best shipped policy, if it was.
+        What it was chosen for as the best shipped policy.
     """
 
     name: str
@@ -77,7 +78,7 @@ class Contestant:
 
     @property
     def problem(self) -> ReachProblem | None:
-        """The problem that it was trained for, if it was."""
+        """The problem that it was trained for, if any."""
         return self.policy.problem if self.policy else None
 
     def serves(
@@ -87,9 +88,8 @@ class Contestant:
     ) -> bool:
         """Whether it was made for a problem.
 
-        What was not trained is for every problem. A policy with a mirror learnt the goals of one
-        side, so it is for each side alone, too. ``change`` makes the changes to the problem that a
-        policy was trained for which make no difference.
+        What was not trained is for every problem. A policy with a mirror learnt one side, so it is
+        for each side alone, too. ``change`` is made to the problem that it was trained for.
         """
         if self.policy is None:
             return True
@@ -99,7 +99,7 @@ class Contestant:
         return trained_for.digest == problem.digest
 
     def check(self, arm: Arm, *, allow_other_arm: bool = False) -> None:
-        """See that the policy, if there is one, fits an arm and was trained for it."""
+        """Check that the policy, if any, fits an arm and was trained for it."""
         if self.policy is None:
             return
         if not allow_other_arm:
@@ -176,7 +176,7 @@ UNTRAINED = {**BASELINES, ORACLE.name: ORACLE}
 
 
 def measure_holding(contestant: Contestant, trials: TrialSet) -> Holding:
-    """Let a contestant face trials that success does not end; the oracle aims at `AIM` there."""
+    """Run trials that success does not end; the oracle aims at `AIM` there."""
     endless = trials.with_tolerance(NEVER)
     if contestant is ORACLE:
         aimed = trials.with_tolerance(min(AIM, trials.problem.task.tolerance))
@@ -198,12 +198,13 @@ def find_contestants(
     Parameters
     ----------
     name_or_file : str or Path
-        A baseline, ``"oracle"``, a shipped policy, a group of them (all training seeds),
-        ``"best"``, a policy file, a model of Stable-Baselines3 (.zip), a folder of either, or
-        ``"module:function"``. A model and a module run code: open only those that you trust.
+        A baseline, ``"oracle"``, a shipped policy, a group of them (all
+        training seeds), ``"best"``, a policy file, a model of Stable-Baselines3
+        (.zip), a folder of either, or ``"module:function"``. A model and a
+        module run code: open only those that you trust.
     problem : ReachProblem, str or Path, optional
-        What a model is for, as its file does not say, or the best shipped policy; others say it
-        themselves.
+        What a model is for, as its file does not say, or the best shipped
+        policy; others say it themselves.
     vec_normalize : str or Path, optional
         Statistics of a model's observations; see `Policy.from_sb3`.
     """
@@ -229,7 +230,7 @@ def contestant_of(
     policy: str | Path | Policy | Contestant | PolicyFunction | Predictor,
     problem: ProblemLike | None,
 ) -> Contestant:
-    """Enter a policy: by a name or file, of which a group's first seed; itself; or a function."""
+    """Enter a policy, the first of a name or file, or a function."""
     if isinstance(policy, Contestant):
         return policy
     if isinstance(policy, Policy):
@@ -260,7 +261,7 @@ def is_import_path(text: str) -> bool:
 
 
 def _imported_contestant(name: str) -> Contestant:
-    """A policy, or what chooses actions, of a module, also of one in the current directory."""
+    """A policy or function of a module, perhaps in the current directory."""
     module_name, _, attribute = name.partition(":")
     if str(Path.cwd()) not in sys.path:
         sys.path.insert(0, str(Path.cwd()))
@@ -285,7 +286,7 @@ def _imported_contestant(name: str) -> Contestant:
 
 
 def policy_function(policy: Any, name: str) -> PolicyFunction:
-    """A function of observations, (n, n_observations), or what has a ``predict``, as the first."""
+    """The function of observations, (n, n_observations), itself or as ``predict``."""
     if inspect.isclass(policy) or not (callable(policy) or hasattr(policy, "predict")):
         raise InvalidInputError(
             f"{name!r} is neither a function of observations nor has a method predict: "

@@ -1,4 +1,4 @@
-"""The document of an evaluation: everything about it, to keep and to face the same trials again."""
+"""The document of an evaluation, from which trials can be faced again."""
 
 import json
 from pathlib import Path
@@ -46,7 +46,7 @@ class FacedProblem(Document, frozen=True, kw_only=True):
     goals : list
         Positions, (trials, 3) [m].
     oracle : Bounds, optional
-        What the oracle found, if it was asked.
+        What the oracle found, if asked.
     """
 
     arm: str
@@ -59,7 +59,7 @@ class FacedProblem(Document, frozen=True, kw_only=True):
 
     @classmethod
     def of(cls, trials: TrialSet, bounds: OracleSolutions | None) -> "FacedProblem":
-        """What was faced, with the bounds of the first trials, if they are known."""
+        """What was faced, with the bounds of the first trials, if known."""
         return cls(
             arm=trials.simulator.arm.name,
             problem=trials.problem.pinned.to_json(),
@@ -77,11 +77,12 @@ class Protocol(Document, frozen=True, kw_only=True):
     Parameters
     ----------
     hold : bool
-        Whether trials were run without an end at success, too.
+        Whether trials also ran without an end at success.
     versions : dict of str
-        Versions of Python and of the libraries that results may depend on.
+        Versions of Python and libraries that results may depend on.
     commit : str, optional
-        Commit of kinarm, -dirty behind it if files were changed; null without Git.
+        Commit of kinarm, -dirty behind it if files were changed; null without
+        Git.
     """
 
     format_version: Literal[4] = 4
@@ -103,10 +104,7 @@ class Failures(Cause, frozen=True, kw_only=True):
 
 
 class TrialEnds(Document, frozen=True, kw_only=True):
-    """How each trial ended; distances in [m], and the bodies that touched.
-
-    Their order is that of the trials.
-    """
+    """How each trial ended, in order; distances in [m], and bodies that touched."""
 
     final_distance: list[float]
     steps: list[Count]
@@ -120,8 +118,8 @@ class TrialHolding(Document, frozen=True, kw_only=True):
     Parameters
     ----------
     closest, farthest_at_end : list of float
-        Smallest distance from the goal, and the largest one in the last steps, null where contact
-        ended the trial [m].
+        Smallest distance from the goal, and the largest one in the last steps,
+        null where contact ended the trial [m].
     """
 
     closest: list[float]
@@ -136,7 +134,7 @@ class Row(Document, frozen=True, kw_only=True):
     Parameters
     ----------
     trained_on : str, optional
-        Name of the problem that the policy was trained for, if it was trained.
+        Name of the problem that the policy was trained for.
     metrics : dict of Estimate
         Figures of merit by their names in kinarm.evaluation.METRICS.
     failures : list of Failures
@@ -161,7 +159,7 @@ class Result(Row, frozen=True, kw_only=True):
     note : str
         A remark, such as the statistics in use.
     held : TrialHolding
-        What happened without an end at success, if that was asked for.
+        What happened without an end at success, if asked for.
     """
 
     training_seed: int | None
@@ -171,7 +169,7 @@ class Result(Row, frozen=True, kw_only=True):
 
 
 class Spread(Document, frozen=True, kw_only=True):
-    """A figure over the training seeds: its extremes, standard deviation and values."""
+    """A figure over training seeds: extremes, standard deviation and values."""
 
     min: float
     max: float
@@ -222,7 +220,7 @@ class EvaluationDocument(Document, frozen=True, kw_only=True):
 
     @classmethod
     def load(cls, path: str | Path) -> "EvaluationDocument":
-        """Read a document; one that is damaged or of another version is refused."""
+        """Read a document; a damaged one or one of another version is refused."""
         with reading(repr(str(path)), "evaluation", InvalidInputError):
             content = json.loads(Path(path).read_bytes())
         try:
@@ -233,7 +231,7 @@ class EvaluationDocument(Document, frozen=True, kw_only=True):
             ) from error
 
     def result(self, policy: str | None, problem: str | None) -> Result:
-        """Find the result of a policy, or of a group's first seed, on a problem."""
+        """The result of a policy, or of a group's first seed, on a problem."""
         fitting = [row for row in self.results if problem in (None, row.problem)]
         if policy is None:
             named = [row for row in fitting if row.trained_on is not None] or fitting
@@ -261,7 +259,7 @@ class EvaluationDocument(Document, frozen=True, kw_only=True):
         return ReachProblem.from_json(self.faced(name).problem, f"problem {name}")
 
     def trials(self, problem: str) -> TrialSet:
-        """The trials of a problem as they were faced, if they and the arm are still the same."""
+        """The trials of a problem; refused if their hash differs."""
         faced, simulator = self.faced(problem), Simulator(self.problem(problem))
         starts = finite_array("starts", faced.starts, (None, simulator.arm.n_joints))
         goals = finite_array("goals", faced.goals, (len(starts), 3))

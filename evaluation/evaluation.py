@@ -43,8 +43,8 @@ from kinarm.simulator import PolicyFunction
 class Evaluation:
     """How one policy did on one problem: ``rollouts`` of ``trials``.
 
-    ``bounds`` are what any policy could do in the trials, or in the first ones, and ``holding`` is
-    what this one did where success did not end them, if that was asked for.
+    ``bounds``, if known, are what any policy could do in the trials, or in the first ones;
+    ``holding``, if known, is what this one did where success did not end them.
     """
 
     contestant: Contestant
@@ -60,7 +60,7 @@ class Evaluation:
 
     @cached_property
     def metrics(self) -> dict[str, Estimate]:
-        """Every figure of merit by its name in `kinarm.evaluation.METRICS`."""
+        """Figures of merit by their name in `kinarm.evaluation.METRICS`."""
         return estimate_metrics(_outcomes((self,)))
 
     @property
@@ -84,7 +84,7 @@ class Evaluation:
 
     @property
     def step_ratio(self) -> NDArray[np.float64]:
-        """Steps taken over those proven to be necessary, of the trials that succeeded."""
+        """Steps taken over those proven necessary, of successful trials."""
         return _outcomes((self,)).step_ratio
 
     @property
@@ -94,7 +94,7 @@ class Evaluation:
 
     @property
     def result(self) -> Result:
-        """Figures of merit, and every trial, for a document."""
+        """Figures of merit and every trial, for a document."""
         rollouts, holding = self.rollouts, self.holding
         ends = TrialEnds(
             final_distance=rollouts.distance.tolist(),
@@ -120,7 +120,7 @@ class Evaluation:
         )
 
     def to_json(self) -> dict[str, Any]:
-        """Figures of merit and every trial, as a dictionary that JSON can hold."""
+        """Figures of merit and every trial as JSON holds them."""
         return self.result.to_json()
 
     def __repr__(self) -> str:
@@ -131,7 +131,7 @@ class Evaluation:
 
 @dataclass(frozen=True, eq=False)
 class PooledEvaluation:
-    """How several training seeds of one recipe did on the same trials, one a member."""
+    """How several training seeds of one recipe did on the same trials."""
 
     name: str
     members: tuple[Evaluation, ...]
@@ -143,7 +143,7 @@ class PooledEvaluation:
 
     @cached_property
     def metrics(self) -> dict[str, Estimate]:
-        """Every figure of merit over all seeds; intervals are about other trainings and trials."""
+        """Figures of merit over all seeds; intervals are over seeds and trials."""
         return estimate_metrics(_outcomes(self.members))
 
     @property
@@ -153,7 +153,7 @@ class PooledEvaluation:
 
     @property
     def spread(self) -> dict[str, Spread]:
-        """Extremes, standard deviation and values over the seeds, of the metrics that all have."""
+        """How the metrics that all seeds have vary over the seeds."""
         spread = {}
         for name in self.metrics:
             known = [member.metrics[name].value for member in self.members]
@@ -165,7 +165,7 @@ class PooledEvaluation:
 
     @property
     def result(self) -> PooledResult:
-        """Figures of merit of several training seeds, for a document."""
+        """Figures of merit over all seeds, for a document."""
         worst = self.worst
         return PooledResult(
             **_row(self.name, self.members),
@@ -181,7 +181,7 @@ class PooledEvaluation:
         )
 
     def to_json(self) -> dict[str, Any]:
-        """Figures of merit, as a dictionary that JSON can hold."""
+        """Figures of merit as JSON holds them."""
         return self.result.to_json()
 
     def __repr__(self) -> str:
@@ -201,7 +201,7 @@ def _outcomes(members: Sequence[Evaluation]) -> Outcomes:
 
 
 def _row(name: str, evaluations: Sequence[Evaluation]) -> dict[str, Any]:
-    """Fields of a row: what it is about, and why trials failed, the most frequent cause first."""
+    """Fields of a row, with causes of failure, the most frequent first."""
     contestant, trials = evaluations[0].contestant, evaluations[0].trials
     causes = (
         failure_causes(each.outcomes, each.rollouts.steps.tolist(), each.contacts)
@@ -243,28 +243,33 @@ def evaluate(
     Parameters
     ----------
     policy : str, Path, Policy, Contestant, function or predictor
-        What `find_contestants` finds by a name or file (a group's first seed); a policy; a function
-        from observations (n, n_observations) to actions (n, n_actions); or something with a
-        method ``predict`` as models of Stable-Baselines3 have it.
+        A name or file as for `find_contestants` (of a group, the first seed); a
+        policy; a function from observations (n, n_observations) to actions (n,
+        n_actions); or what has a ``predict`` as in Stable-Baselines3.
     problem : ReachProblem, str or Path, optional
-        The problem that it faces; by default the one that the policy was trained for.
+        The problem; by default the one that the policy was trained for.
     trials, seed : int
-        Number of trials, and their seed.
+        Number and seed of the trials.
     allow_other_arm : bool
         Whether a policy may face an arm that it was not trained for.
     oracle : bool
-        Whether to bound what any policy could do, in the first 2000 trials at most.
+        Whether to bound what any policy could do, in the first 2000 trials at
+        most.
     hold : bool
-        Whether to run the trials once more without an end at success; see `Evaluation`.
+        Whether to run the trials once more without an end at success; see
+        `Evaluation`.
     **overrides
-        Changes of the problem, such as ``tolerance``; see `kinarm.ReachProblem.replace`.
+        Changes of the problem, such as ``tolerance``; see
+        `kinarm.ReachProblem.replace`.
 
     Raises
     ------
     InvalidInputError
-        If a number is out of range, or no problem is given for an untrained policy.
+        If a number is out of range, or no problem is given for an untrained
+        policy.
     PolicyFileError
-        If the policy cannot be read, was trained for another arm, or does not fit this one.
+        If the policy cannot be read, was trained for another arm, or does not
+        fit this one.
     """
     contestant = contestant_of(policy, problem)
     faced = problem if problem is not None else contestant.problem
@@ -289,9 +294,10 @@ def run_trials(
     ----------
     contestant, trials : Contestant, TrialSet
         Who faces what.
-    bounds, hold : OracleSolutions, bool
-        What any policy could do in the trials, or in the first ones, and whether to run them once
-        more without an end at success; see `Evaluation`.
+    bounds : OracleSolutions, optional
+        What any policy could do in the trials, or in the first ones.
+    hold : bool
+        Whether to run the trials once more without an end at success.
     """
     holding = measure_holding(contestant, trials) if hold else None
     return Evaluation(contestant, trials, contestant.run(trials), bounds, holding)
@@ -300,8 +306,7 @@ def run_trials(
 def pool(evaluations: Sequence[Evaluation]) -> tuple[PooledEvaluation, ...]:
     """Pool the training seeds of each recipe and problem that has several.
 
-    What belongs together is what policies record of their training; see
-    ``kinarm.evaluation.selection.group_names``.
+    Groups are those of ``kinarm.evaluation.selection.group_names``.
     """
     names = group_names(evaluation.contestant for evaluation in evaluations)
     groups: dict[tuple[str, str], list[Evaluation]] = {}
@@ -313,12 +318,12 @@ def pool(evaluations: Sequence[Evaluation]) -> tuple[PooledEvaluation, ...]:
 
 
 def evaluation_document(evaluations: Sequence[Evaluation], command: str) -> EvaluationDocument:
-    """Everything about an evaluation, to be written and read again.
+    """Everything about an evaluation, to write and read again.
 
     Parameters
     ----------
     evaluations : sequence of Evaluation
-        Made with one trial set per problem; all policies, and all problems, have own names.
+        One trial set per problem; policies and problems have distinct names.
     command : str
         The command that made them.
     """

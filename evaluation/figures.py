@@ -27,7 +27,7 @@ BIN_WIDTH = 0.05
 def distance_histograms(evaluations: Sequence[Evaluation]) -> "Figure":
     """Histograms of the final distance, a panel per problem (paper, Figure 2, right).
 
-    Training seeds of one recipe share a colour: the line is their mean, thin lines are the seeds.
+    Training seeds share a colour: thin lines are the seeds, the thick one is their mean.
     """
     problems = {evaluation.problem.digest: evaluation.problem for evaluation in evaluations}
     labels = series_labels(evaluations)
@@ -53,7 +53,7 @@ def distance_histograms(evaluations: Sequence[Evaluation]) -> "Figure":
 def panels_figure(
     size: tuple[float, float], rows: int, columns: int, **options: Any
 ) -> "tuple[Figure, NDArray[Any]]":
-    """A figure and its panels, shape (rows, columns), without top and right spines.
+    """A figure and its panels, shape (rows, columns), with left and bottom spines.
 
     Parameters
     ----------
@@ -78,7 +78,7 @@ def _stairs(
     label: str,
     number: int,
 ) -> None:
-    """Draw the histogram of each training seed faintly and their mean boldly."""
+    """Draw the histograms of the seeds faintly and their mean boldly."""
     colour, dash = COLOURS[number % len(COLOURS)], DASHES[number // len(COLOURS) % len(DASHES)]
     shares = np.array([np.histogram(d, edges)[0] / len(d) for d in distances])
     for share in shares if len(shares) > 1 else ():
@@ -87,7 +87,7 @@ def _stairs(
 
 
 def series_labels(evaluations: Sequence[Evaluation]) -> list[str]:
-    """Name of what the training seeds of a recipe share, and its problem if it is another one.
+    """Name of each evaluation's group, with its training problem if different.
 
     A symmetric policy for several goal regions has one name on all problems that it is for.
     """
@@ -109,14 +109,14 @@ def _label(evaluation: Evaluation, group: str) -> str:
 
 
 def save_figure(figure: "Figure", folder: Path, name: str) -> tuple[Path, ...]:
-    """Write a figure as PNG and as SVG, with the same bytes at any time.
+    """Write a figure as PNG and SVG, with the same bytes at any time.
 
     Parameters
     ----------
     figure, folder : Figure, Path
         What to write, and the folder, which exists.
     name : str
-        Name of the two files, without what they end in.
+        Name of the files without suffix.
     """
     import matplotlib
 

@@ -1,4 +1,4 @@
-"""The figures of merit in one table, which documents, tables, reports and the docs read."""
+"""The figures of merit, in one table."""
 
 import math
 from collections.abc import Callable
@@ -13,16 +13,16 @@ from kinarm.evaluation.outcomes import EARLY_STEPS, HOLDING_STEPS, Outcomes
 
 FINAL = "final distance over all trials, however they ended"
 APPROACH = "closest approach over all trials, if success does not end them; contact does"
-"""Distances that statistics are of."""
+"""Distances of which there are statistics."""
 
 LIMITS = (0.1, 0.2)
 """Distances whose shares are reported beside success [m]."""
 
 CLOSE = (0.02, 0.01, 0.005)
-"""Distances whose shares are reported where success does not end a trial [m]."""
+"""Distances whose shares are reported if success does not end trials [m]."""
 
 HOLDING_WITHIN = 0.01
-"""A goal counts as held if the tool stays within this distance to the end [m]."""
+"""Distance within which the tool stays to the end if a goal is held [m]."""
 
 ALWAYS = float("inf")
 """Priority of columns that are never left out."""
@@ -30,32 +30,33 @@ ALWAYS = float("inf")
 
 @dataclass(frozen=True, kw_only=True)
 class Metric:
-    """A figure of merit: its meaning, its formula and how tables show it.
+    """A figure of merit: meaning, formula and how tables show it.
 
     Attributes
     ----------
     meaning, definition : str
-        What it is, and its formula in mathematics, in the letters of the documentation.
+        What it is, and its mathematical formula, with the letters of the
+        documentation.
     formula : callable
-        From `Outcomes` to the figure; None or NaN where there is nothing to tell. For an interval
-        it is asked about many resamples at once and works along the last axis.
+        From `Outcomes` to the figure; None or NaN if unknown. For intervals it
+        works along the last axis of many resamples.
     unit : str
-        ``"%"`` for shares, which are kept as fractions and shown in per cent.
+        ``"%"`` for shares, kept as fractions and shown in per cent.
     interval : ``"Wilson"``, ``"bootstrap"`` or None
-        How its 95 % interval is made. Wilson's is for shares of trials, whose formula is asked
-        about each trial by itself as well.
+        How its 95 % interval is made. Wilson's is for shares of trials; the
+        formula also gets each trial by itself.
     needs_bounds, needs_holding : bool
-        Whether it compares with the oracle, or is about trials that go on after success.
+        Whether it needs the oracle, or trials that go on after success.
     heading, spread_heading : str
-        Headings of its column, and of one for its range over training seeds; without the first it
-        is in documents alone.
+        Headings of its column, and of its range over training seeds; without
+        one it is in documents alone.
     digits, shows_interval : int, bool
-        Decimals that are shown, and whether the interval is.
+        Decimals, and whether the interval is shown.
     beside : tuple of str, optional
-        Name of another metric that is shown in the same column, and how, such as ``"{} s"``.
+        Another metric in the same column, and how it is shown, such as ``"{}
+        s"``.
     priority : float
-        Where space is scarce, columns of low priority are left out first, and those of infinite
-        priority never.
+        Where space is scarce, columns of low priority are left out first.
     """
 
     meaning: str
@@ -106,13 +107,13 @@ def _middle_half(ordered: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def _median(ordered: NDArray[np.float64]) -> Any:
-    """Median along the last axis of values that are in order, which NumPy would sort again."""
+    """Median along the last axis of ordered values, which NumPy would sort again."""
     n = ordered.shape[-1]
     return (ordered[..., (n - 1) // 2] + ordered[..., n // 2]) / 2
 
 
 def _p95(ordered: NDArray[np.float64]) -> Any:
-    """Their 0.95 quantile, interpolated in NumPy's way."""
+    """0.95 quantile of ordered values, interpolated in NumPy's way."""
     position = 0.95 * (ordered.shape[-1] - 1)
     low, high = ordered[..., math.floor(position)], ordered[..., math.ceil(position)]
     beyond = position % 1
@@ -303,4 +304,4 @@ METRICS: dict[str, Metric] = {
         priority=8.5,
     ),
 }
-"""All figures of merit by their name in documents. A new one is one entry here."""
+"""All figures of merit by their name in documents."""

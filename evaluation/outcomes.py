@@ -1,4 +1,4 @@
-"""How trials ended in the hands of one or several training seeds, and why they failed."""
+"""How trials ended, and why they failed."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -14,7 +14,7 @@ from kinarm.evaluation.schemas import Document
 from kinarm.evaluation.trials import TrialSet
 
 EARLY_STEPS = 3
-"""Contact within so many steps is early: the arm started close to what it touches."""
+"""Contact within so many steps is early: the arm started close to it."""
 
 HOLDING_STEPS = 10
 """Last steps of a trial over which the goal is to be held."""
@@ -25,15 +25,15 @@ Pair = tuple[str, str]
 
 @dataclass(frozen=True, eq=False)
 class Holding:
-    """How close a policy came, and whether it stayed, in trials that success does not end.
+    """How close a policy came and stayed in trials that success does not end.
 
     Attributes
     ----------
     closest : ndarray, shape (n,)
-        Smallest distance from the tool to the goal after any step [m].
+        Smallest distance of the tool from the goal after any step [m].
     farthest_at_end : ndarray, shape (n,)
-        Largest distance after the last `HOLDING_STEPS` steps, or all if there are fewer [m];
-        infinite where contact ended the trial.
+        Largest distance after the last `HOLDING_STEPS` steps, or all if fewer
+        [m]; infinite where contact ended the trial.
     collision, steps : ndarray, shape (n,)
         Whether contact ended the trial, and steps taken.
     """
@@ -45,7 +45,7 @@ class Holding:
 
     @classmethod
     def of(cls, rollouts: Rollouts, trials: TrialSet) -> "Holding":
-        """Measure rollouts that kept the configurations visited."""
+        """Measure rollouts that kept their configurations."""
         paths = rollouts.paths[:, 1:]
         visited = ~np.isnan(paths[..., 0])
         tools = trials.simulator.world.poses(paths[visited])[:, :3, 3]
@@ -62,7 +62,7 @@ class Holding:
 
 
 def _joined(field: str, name: str, meaning: str) -> "cached_property[NDArray[Any]]":
-    """Column of all seeds in a field of `Outcomes`, of the resampled trials."""
+    """Column of all seeds and resampled trials in a field of `Outcomes`."""
 
     def joined(self: "Outcomes") -> NDArray[Any]:
         columns = (getattr(seed, name) for seed in getattr(self, field))
@@ -77,20 +77,22 @@ def _joined(field: str, name: str, meaning: str) -> "cached_property[NDArray[Any
 class Outcomes:
     """Outcomes of one or several training seeds in the same trials.
 
-    Their arrays are joined along the last axis, shape (..., n_seeds * n_trials).
+    Their arrays are joined along the last axis, shape (..., n_seeds *
+    n_trials).
 
     Attributes
     ----------
     rollouts : tuple of Rollouts
-        One per training seed, or what has the same columns, but for configurations.
+        One per training seed, or what has the same columns without
+        configurations.
     bounds : OracleSolutions or None
-        What any policy could do in the trials, or in the first ones, if that is known.
+        What any policy could do in the trials, or in the first ones, if known.
     holding : tuple of Holding
-        What they did where success did not end the trials, if that is known.
+        What they did without an end at success, if known.
     time_step : float
         Duration of a step [s].
     numbers : ndarray of int, shape (..., n_trials), optional
-        Resampled trials; by default each of them once.
+        Resampled trials; each once by default.
     """
 
     rollouts: tuple[Any, ...]
@@ -100,7 +102,7 @@ class Outcomes:
     numbers: NDArray[np.int64] | None = None
 
     def resampled(self, numbers: NDArray[np.int64]) -> "Outcomes":
-        """The same of resampled trials, by their numbers, shape (..., n_trials)."""
+        """The same of trials by their numbers, shape (..., n_trials)."""
         return replace(self, numbers=numbers)
 
     def of_seed(self, seed: int) -> "Outcomes":
@@ -119,7 +121,7 @@ class Outcomes:
 
     @cached_property
     def ordered_distance(self) -> NDArray[np.float64]:
-        """Final distances along the last axis, the smallest first [m]; figures share them."""
+        """Final distances along the last axis, the smallest first [m]."""
         return np.sort(self.distance, axis=-1)
 
     @cached_property
@@ -129,14 +131,14 @@ class Outcomes:
 
     @property
     def relative_success(self) -> float | None:
-        """Success divided by the oracle's, in the trials that the oracle was asked about."""
+        """Success divided by the oracle's, in the bounded trials."""
         reachable = self._known_bounds.reachable
         succeeded = [rollouts.success[: len(reachable)] for rollouts in self.rollouts]
         return float(np.mean(succeeded) / reachable.mean()) if reachable.any() else None
 
     @cached_property
     def step_ratio(self) -> NDArray[np.float64]:
-        """Steps over those proven necessary, of trials that succeeded and are bounded, one axis."""
+        """Steps over those proven necessary, of successful bounded trials, one axis."""
         necessary = self._known_bounds.steps_lower_bound
         bounded = slice(len(necessary))
         ratios = [
@@ -181,7 +183,7 @@ def failure_causes(
     Parameters
     ----------
     outcomes, steps, contacts
-        How trials ended, after how many steps, and the bodies that touched.
+        How trials ended, after how many steps, and what touched.
     """
     return {
         trial: Cause(contacts[trial], outcome == "collision" and steps[trial] <= EARLY_STEPS)

@@ -37,7 +37,7 @@ class Goals(Document, frozen=True, kw_only=True):
 
 
 class Starts(Document, frozen=True, kw_only=True):
-    """How many configurations that the task may start at touch nothing, and what touches at home.
+    """How many starts touch nothing, and what touches at home.
 
     They are random, unless the task lists its starts.
     """
@@ -53,7 +53,7 @@ class Contacts(Document, frozen=True, kw_only=True):
     Parameters
     ----------
     touching : list
-        Every pair of bodies, and at which share of the configurations it touches.
+        Pairs of bodies, and at which share of the configurations they touch.
     left_out : list
         Pairs that are not tested, and why.
     """
@@ -72,7 +72,8 @@ class ProblemCheck(Document, frozen=True, kw_only=True):
     problem : dict
         The problem, in the words of problem files.
     mirror : dict of str
-        What keeps it from being its own mirror image; empty texts where nothing does.
+        What keeps it from being its own mirror image; empty texts if nothing
+        does.
     """
 
     problem: dict[str, Any]
@@ -97,7 +98,7 @@ def check_problem(
     world : World
         The world of the problem.
     trials, seed : int
-        How many trials the oracle faces, and their seed.
+        Number of trials that the oracle faces, and their seed.
     on_progress : callable, optional
         Called with the number of trials solved so far and in all.
     """
@@ -124,7 +125,7 @@ def check_problem(
 
 
 def _goals(trials: TrialSet, on_progress: Progress | None) -> Goals:
-    """Which goals the oracle reaches, and which it proves out of reach within the horizon."""
+    """Goals that the oracle reaches, or proves out of reach within the horizon."""
     solutions = oracle_bounds(trials, on_progress)
     reached = solutions.reachable
     out_of_reach = solutions.steps_lower_bound > trials.problem.task.horizon
@@ -143,7 +144,7 @@ def _goals(trials: TrialSet, on_progress: Progress | None) -> Goals:
 
 
 def random_starts(world: World) -> NDArray[np.float64]:
-    """Configurations that the task may start at, whether something touches or not."""
+    """Configurations that the task may start at, free or not."""
     task, home = world.problem.task, world.arm.home
     if task.starts:
         return world.starts

@@ -1,4 +1,4 @@
-"""An evaluation from what is asked for to what is written: the main path, on one screen."""
+"""An evaluation, from the request to the files."""
 
 from collections.abc import Callable
 from contextlib import ExitStack
@@ -17,14 +17,14 @@ if TYPE_CHECKING:
     from kinarm.evaluation.selection import Pair
 
 DOCUMENT, HISTOGRAMS, REPORT = "evaluation.json", "final_distance", "index.html"
-"""Files that are written; the histograms as PNG and as SVG."""
+"""Files that are written; the histograms as PNG and SVG."""
 
 Tell = Callable[[str], object]
-"""Is told what is being done."""
+"""Called with what is being done."""
 
 
 def policy_choices() -> tuple[str, ...]:
-    """Names of policies, their groups and baselines, which a policy can be chosen by."""
+    """Names by which a policy can be chosen."""
     from kinarm.evaluation.contestants import UNTRAINED
     from kinarm.policies.library import BEST, group_of, policy_names
 
@@ -36,43 +36,45 @@ def policy_choices() -> tuple[str, ...]:
 class EvaluationRequest(ProblemOptions):
     """Evaluate policies on random reaching trials, beside an oracle.
 
-    By default a trained policy faces the problem that it was trained for, changed as the options
-    say, a symmetric one also those with a part of its goals, and a baseline all problems in play.
-    Problems that are named restrict the default selection; together with named policies, or
-    ``matrix``, they say what those face. The oracle joins on every problem that is faced.
+    By default a trained policy faces the problem that it was trained for,
+    changed as the options say, a symmetric one also those with a part of its
+    goals, and a baseline all problems in play. Problems that are named restrict
+    the default selection; together with named policies, or ``matrix``, they say
+    what those face. The oracle joins on every problem that is faced.
 
     Parameters
     ----------
     policies : tuple of str
-        Shipped policy, recipe (all its seeds), best, random, zero, oracle, .npz file, folder of
-        them, Stable-Baselines3's model.zip (runs its code: only if you trust it), or
-        module:function; several, and repeatable.
+        Shipped policy, recipe (all its seeds), best, random, zero, oracle, .npz
+        file, folder of them, Stable-Baselines3's model.zip (runs its code: only
+        if you trust it), or module:function; several, and repeatable.
     problems : tuple of str
-        A problem by name, or a problem file; several, and repeatable. ``problem`` is for a single
-        one.
+        A problem by name, or a problem file; several, and repeatable.
+        ``problem`` is for a single one.
     trials : int
         Trials a problem.
     seed : int
         Seed of the trials.
     vec_normalize : Path
-        Statistics of VecNormalize for models of Stable-Baselines3 (runs code), or none; by default
-        those that bear a model's name.
+        Statistics of VecNormalize for models of Stable-Baselines3 (runs code),
+        or none; by default those that bear a model's name.
     allow_other_arm : bool
         Allow an arm that a policy was not trained for.
     matrix : bool
         Every policy on every problem, not only on its own.
     oracle : bool
-        Ask the oracle what any policy could reach: in the first 2000 trials at most, unless the
-        oracle is a named policy.
+        Ask the oracle what any policy could reach: in the first 2000 trials at
+        most, unless the oracle is a named policy.
     hold : bool
-        Run the trials once more, without ending them at success: how close policies come to the
-        goal, and whether they stay there.
+        Run the trials once more, without ending them at success: how close
+        policies come to the goal, and whether they stay there.
     out : Path
         Folder for evaluation.json and histograms.
     report : Path
         Folder for the report: index.html, one page.
     card : Path
-        Card of the one policy that is named (.md), with the policy (.npz) and a replay (.html).
+        Card of the one policy that is named (.md), with the policy (.npz) and a
+        replay (.html).
     overwrite : bool
         Replace earlier results.
     json : bool
@@ -128,7 +130,7 @@ class EvaluationRequest(ProblemOptions):
     def run(self, command: str | None = None, tell: Tell = lambda _: None) -> "EvaluationDocument":
         """Evaluate, and write the outputs.
 
-        ``command`` is recorded as what did it, or this request; ``tell`` hears what is being done.
+        ``command`` is recorded, by default this request; ``tell`` hears what is being done.
         """
         from kinarm.evaluation.evaluation import evaluation_document
 
@@ -142,7 +144,7 @@ class EvaluationRequest(ProblemOptions):
         return document
 
     def evaluate(self, tell: Tell = lambda _: None) -> "list[Evaluation]":
-        """Let every chosen policy face its trials; as `run`, but for the files."""
+        """Let every chosen policy face its trials; as `run`, without the files."""
         return self._face(self._checked_pairs(), tell)
 
     def _face(self, pairs: "list[Pair]", tell: Tell) -> "list[Evaluation]":
@@ -201,7 +203,7 @@ class EvaluationRequest(ProblemOptions):
             save_figure(distance_histograms(shown), self.out, HISTOGRAMS)
 
     def _checked_pairs(self) -> "list[Pair]":
-        """Who faces which problem, if all of them can and the files can be written."""
+        """Who faces which problem, after checks of policies and files."""
         from kinarm.evaluation.selection import select_pairs
 
         pairs = select_pairs(self)

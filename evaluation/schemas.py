@@ -1,4 +1,4 @@
-"""Documents in JSON: a class states the shape once; text, reader and schema follow from it.
+"""Documents in JSON: text, reader and schema follow from a class.
 
 ``msgspec.json.schema`` gives the JSON schema of a class, with its docstring.
 """
@@ -24,7 +24,7 @@ class Document(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 def document_text(value: Any, indent: str = "\n") -> str:
-    """A document as JSON: objects over several lines, but lists of numbers or words on one."""
+    """A document as JSON: objects over several lines, plain lists on one."""
     if isinstance(value, list) and any(isinstance(each, Mapping) for each in value):
         entries, ends = [document_text(each, indent + " ") for each in value], "[]"
     elif isinstance(value, Mapping):

@@ -1,7 +1,4 @@
-"""Who faces which problem, and which policies are training seeds of one recipe.
-
-What is named is chosen, or what each policy was trained for; seeds are told by their provenance.
-"""
+"""Who faces which problem, and which policies are training seeds of one recipe."""
 
 import json
 from collections import Counter
@@ -24,7 +21,7 @@ Pair = tuple[Contestant, ReachProblem]
 """Who faces what."""
 
 VARYING = ("seed", "vec_normalize")
-"""Settings that differ between the training seeds of a recipe."""
+"""Settings that differ between training seeds."""
 
 
 def select_pairs(request: "EvaluationRequest") -> list[Pair]:
@@ -58,14 +55,14 @@ def _named_problems(request: "EvaluationRequest") -> list[ReachProblem]:
 
 
 def _changed(request: "EvaluationRequest", problem: ReachProblem) -> ReachProblem:
-    """A problem with the changes that the options make of any."""
+    """A problem with the changes that the options make."""
     return replace(request, problem=None, task=None).resolve(problem)
 
 
 def _shipped(request: "EvaluationRequest", named: list[ReachProblem]) -> list[Contestant]:
-    """Shipped policies for the arm, and for the problems that are named; then the baselines.
+    """Shipped policies for the arm and the named problems; then the baselines.
 
-    Their names say what they were trained for: others are not opened.
+    Names say what policies were trained for: others are not opened.
     """
     serving = {
         name
@@ -100,7 +97,7 @@ def _named_contestants(request: "EvaluationRequest", named: list[ReachProblem]) 
 
 
 def _problems(request: "EvaluationRequest", chosen: list[Contestant]) -> list[ReachProblem]:
-    """Problems that contestants were trained or chosen for, or all; the paper's come first."""
+    """Problems of the contestants, or all; the paper's come first."""
     own: dict[str, ReachProblem] = {}
     for each in chosen:
         trained = [_changed(request, each.problem)] if each.problem else []
@@ -134,15 +131,15 @@ def check_names(pairs: Iterable[Pair]) -> None:
 
 
 def group_names(contestants: Iterable[Contestant]) -> dict[str, str]:
-    """Name of what each contestant shares with other training seeds, by its own name.
+    """Name of each contestant's group of training seeds, by its own name.
 
-    Seeds belong together that have the same learner, settings and problem. Where a seed occurs
-    twice, shipped policies, and those of each folder, are apart from others.
+    Seeds of a group share learner, settings and problem. If a seed occurs
+    twice, shipped policies, and those of each folder, are apart.
 
     Parameters
     ----------
     contestants : iterable of Contestant
-        Contestants with names of their own; one may occur several times.
+        Contestants with distinct names; one may occur several times.
     """
     alike: dict[Hashable, list[Contestant]] = {}
     for contestant in {each.name: each for each in contestants}.values():
@@ -160,7 +157,7 @@ def group_names(contestants: Iterable[Contestant]) -> dict[str, str]:
 
 
 def _training(contestant: Contestant) -> Hashable:
-    """A key that all seeds of a recipe share; the name if the contestant is no such seed."""
+    """A key that all seeds of a recipe share, or the name."""
     if contestant.policy is None or contestant.seed is None:
         return contestant.name
     made = contestant.policy.provenance
@@ -181,7 +178,7 @@ SPLIT_BY: tuple[Callable[[Contestant], Hashable], ...] = (
 
 
 def _with_distinct_seeds(members: list[Contestant], depth: int = 0) -> list[list[Contestant]]:
-    """Split what holds a seed twice: by being shipped, by folder, and one by one."""
+    """Split a group with a seed twice: by being shipped, by folder, one by one."""
     if len({member.seed for member in members}) == len(members):
         return [members]
     parts: dict[Hashable, list[Contestant]] = {}
@@ -191,7 +188,7 @@ def _with_distinct_seeds(members: list[Contestant], depth: int = 0) -> list[list
 
 
 def _shared_name(group: Sequence[Contestant]) -> str:
-    """The name without the seed if all have the same, else algorithm, recipe and problem."""
+    """The common name without the seed, else algorithm, recipe and problem."""
     names = {group_of(member.name) for member in group}
     first = group[0]
     if len(names) == 1 or first.problem is None:
@@ -200,7 +197,7 @@ def _shared_name(group: Sequence[Contestant]) -> str:
 
 
 def named_apart(contestants: Sequence[Contestant]) -> list[Contestant]:
-    """Put the folder before the names of files that are called alike, but for shipped policies."""
+    """Put the folder before equal names of files, but for shipped policies."""
     count = Counter(contestant.name for contestant in contestants)
     named = []
     for each in contestants:

@@ -1,6 +1,6 @@
-"""Estimates with 95 % intervals, of the figures of merit and of contrasts.
+"""Figures of merit and contrasts with their 95 % intervals.
 
-Written out here, because SciPy's statistics take longer to load than a policy to evaluate.
+They are written out, because SciPy's take longer to load than a policy to evaluate.
 """
 
 import math
@@ -23,7 +23,7 @@ DEVIATIONS = 1.959963984540054
 """Standard deviations that enclose this share of a normal distribution."""
 
 NUMBERS_AT_ONCE = 400_000
-"""How many trial numbers are resampled at once, so that many trials do not fill the memory."""
+"""Trial numbers that are resampled at once, which limits the memory."""
 
 Interval = tuple[float, float]
 
@@ -35,9 +35,9 @@ class Estimate:
     Parameters
     ----------
     value : float, optional
-        The figure; None where there is nothing to tell.
+        The figure; None if unknown.
     ci95 : tuple of float, optional
-        Its 95 % interval, where it has one.
+        Its 95 % interval, if any.
     """
 
     value: float | None
@@ -58,10 +58,9 @@ class Estimate:
 
 
 def estimate_metrics(outcomes: Outcomes) -> dict[str, Estimate]:
-    """Compute all `METRICS`, with their intervals; unknown figures stay empty.
+    """Compute all `METRICS` with intervals; unknown figures stay empty.
 
-    The interval of one policy is about other trials, that of several training seeds about other
-    trainings and other trials.
+    Intervals are about other trials, and with several training seeds also about other trainings.
     """
     known = {
         name: metric
@@ -92,8 +91,8 @@ def _of_shares(outcomes: Outcomes, known: Mapping[str, Metric]) -> dict[str, Int
 def _bootstrapped(outcomes: Outcomes, known: Mapping[str, Metric]) -> dict[str, Interval | None]:
     """Intervals of other metrics, from resamples of the trials.
 
-    Those of several training seeds add the variance over the seeds to that over the trials, which
-    all of them meet, as `contrast` does of means.
+    With several training seeds, the variance over the seeds is added to that over the trials, as
+    in `contrast`.
     """
     formulas = {name: each.formula for name, each in known.items() if each.interval == "bootstrap"}
 
@@ -125,8 +124,9 @@ def wilson_interval(hits: int, trials: int, seeds: int = 1) -> Interval:
     hits, trials : int
         Hits of all seeds together, and the trials that every seed faced.
     seeds : int
-        Number of training seeds. They face the same trials, so they are no independent evidence
-        about them: the interval is that of the trials of one, widened to whole hits.
+        Number of training seeds. They face the same trials and are no
+        independent evidence: the interval is that of the trials of one, widened
+        to whole hits.
     """
 
     def end(hits: int, side: int) -> float:
@@ -140,19 +140,19 @@ def wilson_interval(hits: int, trials: int, seeds: int = 1) -> Interval:
 
 
 def percentile_interval(figures: NDArray[np.float64]) -> Interval:
-    """Ends of the middle 95 % of the figures of all resamples, shape (n_resamples,)."""
+    """Ends of the middle 95 % of figures, shape (n_resamples,)."""
     ordered, tail = np.sort(figures), (1 - LEVEL) / 2
     return _quantile(ordered, tail), _quantile(ordered, 1 - tail)
 
 
 def resamples(trials: int) -> Iterable[NDArray[np.int64]]:
-    """Numbers of the trials of all resamples, a piece of shape (n, trials) at a time; seeded."""
+    """Trial numbers of all resamples, in pieces of shape (n, trials); seeded."""
     return _kept(trials) if RESAMPLES * trials <= NUMBERS_AT_ONCE else _drawn(trials)
 
 
 @lru_cache(maxsize=1)
 def _kept(trials: int) -> tuple[NDArray[np.int64], ...]:
-    """The few of one piece: policies face as many trials one after the other."""
+    """A single piece, kept for the next policy with as many trials."""
     return tuple(_drawn(trials))
 
 
@@ -180,11 +180,10 @@ def estimate_text(estimate: Estimate) -> str:
 def contrast(terms: Sequence[tuple[float, NDArray[np.float64]]]) -> Estimate:
     """Weighted sum of means over seeds and trials: of weights, and values (n_seeds, n_trials).
 
-    Seeds and trials are crossed random effects: all seeds of a recipe face the same trials. Several
-    recipes may face them as well, also on tasks whose trials differ in the bench only. The variance
-    is the variance of the seeds' means, in each term, plus that of the trials' weighted means. Both
-    contain the interaction of seed and trial, so the interval is rather too wide. It is Student's,
-    with the degrees of freedom of Welch and Satterthwaite.
+    Seeds and trials are crossed random effects: all seeds, and perhaps several recipes and tasks,
+    face the same trials. The variance is that of the seeds' means, in each term, plus that of the
+    trials' weighted means. Both contain the interaction of seed and trial, so the interval is
+    rather too wide. It is Student's, with the degrees of freedom of Welch and Satterthwaite.
     """
     value = sum(weight * float(values.mean()) for weight, values in terms)
     parts = [
@@ -198,8 +197,8 @@ def contrast(terms: Sequence[tuple[float, NDArray[np.float64]]]) -> Estimate:
 def student(value: float, components: Iterable[tuple[float, int]]) -> Estimate:
     """Interval from independent components of the variance.
 
-    They are estimated variances that add up to that of the statistic, and their degrees of
-    freedom; without any freedom in one of them there is no interval.
+    They are estimated variances that add up to that of the statistic, with their degrees of
+    freedom; where one has none, there is no interval.
     """
     from scipy.special import stdtrit
 
@@ -218,8 +217,8 @@ def mean_share(shares: NDArray[np.float64], n_trials: int) -> Estimate:
     """Mean of the seeds' shares of trials.
 
     The trials' part of the variance is that of a binomial share, with two hits and two misses
-    added (Agresti and Coull), so that it does not vanish where nothing or everything was hit. The
-    ``n_trials`` of a seed count as if all seeds had met the same ones.
+    added (Agresti and Coull), so that it never vanishes. The ``n_trials`` count as if all seeds
+    had met the same ones.
     """
     value = float(shares.mean())
     moderate = (value * n_trials + 2) / (n_trials + 4)
@@ -232,9 +231,9 @@ def mean_share(shares: NDArray[np.float64], n_trials: int) -> Estimate:
 def share_over_seeds(hits: NDArray[Any]) -> Estimate:
     """A share of trials and its 95 % interval.
 
-    That of one seed is Wilson's, about other trials. That of several covers those over seeds and
-    trials (`contrast`), which knows nothing where all seeds agree, and over trials alone. Hits,
-    shape (n_seeds, n_trials), may be shares of several trainings as well.
+    That of one seed is Wilson's. That of several covers Wilson's and the one over seeds and trials
+    (`contrast`), which says nothing where all seeds agree. Hits, shape (n_seeds, n_trials), may be
+    shares of several trainings as well.
     """
     share = float(hits.mean())
     low, high = wilson_interval(round(share * hits.shape[1]), hits.shape[1])
@@ -247,11 +246,10 @@ def share_over_seeds(hits: NDArray[Any]) -> Estimate:
 def superiority(pairs: Sequence[tuple[NDArray[np.float64], NDArray[np.float64]]]) -> Estimate:
     """Probability that a member of the first group is below one of the second; ties count half.
 
-    Several comparisons of the same groups, such as with several measures, and then several pairs
-    of groups are averaged. The interval is Wilson's, for as many independent comparisons as the
-    smaller groups have members: the variance of the statistic is at most theirs (van Dantzig
-    1951), however few seeds there are. Groups have shape (n_measures, n_seeds); infinity stands
-    for never.
+    Measures of the same groups, and then pairs of groups, are averaged. The interval is Wilson's,
+    for as many independent comparisons as the smaller groups have members: the variance of the
+    statistic is at most theirs (van Dantzig 1951). Groups have shape (n_measures, n_seeds);
+    infinity stands for never.
     """
     below = [
         (first[:, :, None] < second[:, None]) + 0.5 * (first[:, :, None] == second[:, None])

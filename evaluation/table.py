@@ -15,14 +15,14 @@ if TYPE_CHECKING:
     from rich.table import Table
 
 SPREAD_PRIORITY = 5
-"""Priority of the columns with ranges over training seeds; see `Metric.priority`."""
+"""`Metric.priority` of columns with ranges over training seeds."""
 
 REPLACED = "* some settings of the recipe are replaced"
 """Meaning of the star in a label."""
 
 
 class Cell(NamedTuple):
-    """A figure as text, empty if there is none, and its interval or other addition."""
+    """A figure as text, or empty, and its interval or other addition."""
 
     value: str = ""
     beside: str = ""
@@ -33,10 +33,7 @@ class Cell(NamedTuple):
 
 @dataclass(frozen=True)
 class Column:
-    """A column of the table, with the cell of each row of the document.
-
-    Columns of low priority are left out first.
-    """
+    """A column of the table, with the cell of each row of the document."""
 
     heading: str
     meaning: str
@@ -59,7 +56,7 @@ def metric_columns() -> list[Column]:
 
 
 def telling_columns(rows: Sequence[Row], priority: float = 0) -> list[Column]:
-    """Metric columns of at least some priority that have something to say of rows."""
+    """Metric columns of some priority that say something about rows."""
     columns = (column for column in metric_columns() if column.priority >= priority)
     return [column for column in columns if any(column.cell(row).value for row in rows)]
 
@@ -79,7 +76,7 @@ def metric_cell(name: str, row: Row) -> Cell:
 
 
 def spread_cell(name: str, row: Row) -> Cell:
-    """A metric's range over training seeds in a row of the document; empty without seeds."""
+    """A metric's range over training seeds; empty without seeds."""
     if not isinstance(row, PooledResult) or name not in row.spread:
         return Cell()
     spread = row.spread[name]
@@ -87,7 +84,7 @@ def spread_cell(name: str, row: Row) -> Cell:
 
 
 def policy_label(row: Row) -> str:
-    """Name of a row's policy; where it names a recipe, with the star of replaced settings.
+    """Name of a row's policy, with the star of replaced settings.
 
     Names of files lack the star: ``ars-tuned-right`` is ``ars-tuned*-right``.
     """
@@ -96,7 +93,7 @@ def policy_label(row: Row) -> str:
 
 
 def has_star(row: Row) -> bool:
-    """Whether the label of a row says that settings of the recipe are replaced."""
+    """Whether the label of a row has the star of replaced settings."""
     return row.recipe.endswith("*") and row.recipe in policy_label(row)
 
 
@@ -108,10 +105,10 @@ def print_table(
     Parameters
     ----------
     document, console : EvaluationDocument, Console
-        What to print, and where to.
+        What to print, and where.
     markdown : bool
-        As Markdown with all columns that say something; else those of low priority are left out
-        where space is scarce.
+        As Markdown with all columns; else some are left out where space is
+        scarce.
     """
     rows = [row for problem in document.protocol.problems for row in table_rows(document, problem)]
     columns = [
@@ -138,7 +135,7 @@ def print_table(
 def _evaluation_table(
     document: EvaluationDocument, columns: Sequence[Column], *, markdown: bool = False
 ) -> "Table":
-    """The figures of a document as a table; several training seeds share a row."""
+    """The table of a document; several training seeds share a row."""
     from rich import box
     from rich.table import Table
 
@@ -156,7 +153,7 @@ def _evaluation_table(
 
 
 def table_rows(document: EvaluationDocument, problem: str) -> list[Row]:
-    """Pooled results of a problem and the results that are not part of them, best first."""
+    """Pooled results of a problem and other results, best first."""
     pooled = [row for row in document.pooled if row.problem == problem]
     members = {name for row in pooled for name in row.members}
     single = [row for row in document.results if row.problem == problem]

@@ -15,18 +15,18 @@ from kinarm.simulator import Simulator
 from kinarm.task import RewardWeights
 
 LOT = 4096
-"""Trials that are drawn together."""
+"""Trials drawn together."""
 
 
 def trial_generator(seed: int, trial: int, stream: int = 0) -> np.random.Generator:
-    """Random generator of one trial, independent of all others.
+    """Random generator of one trial, independent of others.
 
     Parameters
     ----------
     seed, trial : int
         Seed of the set, and number of the trial in it.
     stream : int
-        0 draws the trial itself; others are for contestants that act at random.
+        0 draws the trial; others are for contestants that act at random.
     """
     return np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(trial, stream)))
 
@@ -35,7 +35,7 @@ def trial_generator(seed: int, trial: int, stream: int = 0) -> np.random.Generat
 class TrialSet:
     """Starts and goals, a function of the problem and a seed alone.
 
-    The first n trials of a set are the same for every size of the set.
+    The first trials of a set are the same for every size.
 
     Attributes
     ----------
@@ -57,9 +57,9 @@ class TrialSet:
         Parameters
         ----------
         problem : ReachProblem, str, Path or Simulator
-            The problem, its name or its file; or a simulator of it, to face them in.
+            The problem, its name or file; or a simulator of it.
         trials, seed : int
-            How many, and the seed of the set.
+            Number of trials, and seed of the set.
         """
         simulator = problem if isinstance(problem, Simulator) else Simulator(problem)
         trials, seed = whole_number("trials", trials, 1, MOST_TRIALS), whole_number("seed", seed, 0)
@@ -73,16 +73,16 @@ class TrialSet:
         return cls(simulator, seed, starts, goals)
 
     def chosen(self, numbers: Sequence[int]) -> "TrialSet":
-        """Some of the trials, in the order of their numbers that are given."""
+        """The trials of some numbers, in their order."""
         rows = list(numbers)
         return replace(self, starts=self.starts[rows], goals=self.goals[rows])
 
     def first(self, count: int) -> "TrialSet":
-        """The first trials, or all if there are no more."""
+        """The first trials, or all if there are fewer."""
         return self if len(self) <= count else self.chosen(range(count))
 
     def with_tolerance(self, tolerance: float) -> "TrialSet":
-        """The same starts and goals, which count as reached at another distance [m]."""
+        """The same starts and goals with another tolerance [m]."""
         return replace(self, simulator=self.simulator.with_tolerance(tolerance))
 
     def __len__(self) -> int:
@@ -98,7 +98,7 @@ class TrialSet:
 
     @cached_property
     def digest(self) -> str:
-        """Hash of starts, goals and problem, but for what is rewarded."""
+        """Hash of starts, goals and problem, without its reward."""
         numbers = np.round(np.concatenate([self.starts, self.goals], axis=1), 12) + 0.0
         rules = self.problem.replace(reward=RewardWeights())
         content = rules.digest.encode() + numbers.tobytes()

@@ -12,8 +12,9 @@ __version__ = "1.0.0"
 SEMANTICS = "4"
 """Version of every number that simulator and learners compute from settings and seeds.
 
-It covers starts, goals, trials, rollouts and learning, and identifies finished trainings; the
-oracle's is `kinarm.policies.oracle.ORACLE_SEMANTICS`. How code is written does not matter.
+It covers starts, goals, trials, rollouts and learning, and identifies finished
+trainings; the oracle's is `kinarm.policies.oracle.ORACLE_SEMANTICS`. How code
+is written does not matter.
 
 Raise it in the commit that changes a number on purpose, and record the golden digests anew:
 ``python tests/golden/digests.py --record`` (which refuses others under the same version).

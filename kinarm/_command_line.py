@@ -35,15 +35,17 @@ def add_options(
 ) -> None:
     """Add an option for every field of a dataclass; only given ones are parsed.
 
-    Names, types and help come from the dataclass and its docstring. Fields of a nested dataclass
-    get its name as a prefix, such as ``--reward-success``. A class attribute ``GROUPS`` puts fields
-    into titled groups; ``DEFAULTS`` says what happens without an option whose field has no telling
-    default, and such a field may be left out.
+    Names, types and help come from the dataclass and its docstring. Fields of a
+    nested dataclass get its name as a prefix, such as ``--reward-success``. A
+    class attribute ``GROUPS`` puts fields into titled groups; ``DEFAULTS`` says
+    what happens without an option whose field has no telling default, and such
+    a field may be left out.
 
-    A field's metadata may hold ``flag`` (another name of the option; without dashes, of a
-    positional argument), ``metavar``, ``repeat`` (repetitions of the option give a tuple, else its
-    several values), ``parse`` (makes the value of the text), ``names`` (lists names for help and
-    completion) and ``completes`` (lists them for completion alone).
+    A field's metadata may hold ``flag`` (another name of the option; without
+    dashes, of a positional argument), ``metavar``, ``repeat`` (repetitions of
+    the option give a tuple, else its several values), ``parse`` (makes the
+    value of the text), ``names`` (lists names for help and completion) and
+    ``completes`` (lists them for completion alone).
 
     Parameters
     ----------

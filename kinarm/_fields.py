@@ -84,14 +84,16 @@ def take_base(entries: dict[str, Any], where: str, bases: Collection[str], defau
 def from_plain(kind: type[T], entries: object, where: str, path: str = "") -> T:
     """Build a dataclass from plain values by field names.
 
-    What is unknown, missing, of the wrong type or refused is an `InvalidInputError` of one line.
+    What is unknown, missing, of the wrong type or refused is an
+    `InvalidInputError` of one line.
 
     Parameters
     ----------
     kind, entries
         The dataclass, and plain values.
     where, path : str
-        Names of their source, and of the tables around them, such as ``"scene."``.
+        Names of their source, and of the tables around them, such as
+        ``"scene."``.
     """
     if not isinstance(entries, Mapping):
         table = path.removesuffix(".") or "it"

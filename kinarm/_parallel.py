@@ -52,8 +52,8 @@ def run_together(
 ) -> int:
     """Call ``kernel(counters, given(thread), *arrays)`` on several threads; add up the results.
 
-    By a counter, zero at first, kernels share the rows. The calling thread is number 0. A thread
-    that comes too late is not awaited.
+    By a counter, zero at first, kernels share the rows. The calling thread is
+    number 0. A thread that comes too late is not awaited.
 
     Parameters
     ----------

@@ -33,7 +33,8 @@ class Arm:
     specification, description : ArmSpecification and Description
         What it was made of, and the URDF, reduced to the tool's chain.
     model, geometry : pinocchio.Model and pinocchio.GeometryModel
-        Kinematics, and collision shapes: primitives, or convex hulls of meshes; no pairs.
+        Kinematics, and collision shapes: primitives, or convex hulls of meshes;
+        no pairs.
     n_actuated : int
         Joints, the first ones, that actions move; the others stay at `home`.
     home : ndarray, shape (n_joints,)
@@ -71,16 +72,17 @@ class Arm:
         Parameters
         ----------
         arm : ArmSpecification, str or Path
-            A name of `arm_names`, such as ``"ur5"``, a path of a URDF or arm file, or a
-            specification.
+            A name of `arm_names`, such as ``"ur5"``, a path of a URDF or arm
+            file, or a specification.
         **changes
             Fields of `ArmSpecification` to replace.
 
         Raises
         ------
         UnknownNameError, ArmError
-            If there is no such arm or file, the robot is not a tree on a fixed base whose tool is
-            carried by limited joints with velocity limits, or it does not fit the specification.
+            If there is no such arm or file, the robot is not a tree on a fixed
+            base whose tool is carried by limited joints with velocity limits,
+            or it does not fit the specification.
         """
         if not isinstance(arm, ArmSpecification):
             arm = ArmSpecification(source=str(arm))

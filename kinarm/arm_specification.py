@@ -36,30 +36,35 @@ class AllowedContact(Checked):
 class ArmSpecification(Checked):
     """Which arm, and what of it the simulator is to use.
 
-    What is left out is what the arm file says, if the source has one; see `ArmFile`.
+    What is left out is what the arm file says, if the source has one; see
+    `ArmFile`.
 
     Parameters
     ----------
     source : str
         Name of an arm, or path of a URDF or of an arm file.
     tool_frame : str
-        Link (frame) whose origin is the tool point; by default ``tool0``, or the last link of the
-        longest chain of joints.
+        Link (frame) whose origin is the tool point; by default ``tool0``, or
+        the last link of the longest chain of joints.
     tool_offset : tuple of float
         The tool point in the tool frame, instead of its origin [m].
     package_dirs : tuple of str
-        Folders that hold the packages which ``package://`` mesh names refer to; the folders
-        around the URDF are searched, too.
+        Folders that hold the packages which ``package://`` mesh names refer to;
+        the folders around the URDF are searched, too.
     actuated : tuple of str
-        Names of the joints that actions move, from the base on; by default all but the trailing
-        ones that cannot move the tool point. The others stay at home.
+        Names of the joints that actions move, from the base on; by default all
+        but the trailing ones that cannot move the tool point. The others stay
+        at home.
     held : dict
-        Positions of joints that are locked, by name [rad or m]; those that do not carry the tool
-        are locked anyway, where the URDF has them at zero or as close to it as their limits allow.
+        Positions of joints that are locked, by name [rad or m]; those that do
+        not carry the tool are locked anyway, where the URDF has them at zero or
+        as close to it as their limits allow.
     limits : dict
-        Lower and upper limits to use instead of the URDF's, by joint [rad or m].
+        Lower and upper limits to use instead of the URDF's, by joint [rad or
+        m].
     home : tuple of float
-        Reference configuration; zero, clipped to the limits, by default [rad or m].
+        Reference configuration; zero, clipped to the limits, by default [rad or
+        m].
     velocity_limits : tuple of float
         Limits to use instead of the URDF's [rad/s or m/s].
     allowed_contacts : tuple of AllowedContact
@@ -114,7 +119,8 @@ class ArmSpecification(Checked):
 class ArmFile(Checked):
     """An arm file: an arm, and the origin of its data.
 
-    A TOML file whose table ``arm`` has the fields of `ArmSpecification`, with notes for people.
+    A TOML file whose table ``arm`` has the fields of `ArmSpecification`, with
+    notes for people.
 
     Parameters
     ----------

@@ -25,7 +25,8 @@ class Chain(NamedTuple):
     translation : ndarray, shape (n, 3)
         Origin of a joint frame in its parent joint frame [m].
     rotation : ndarray, shape (n, 4)
-        Orientation of a joint frame at zero in its parent: quaternion (w, x, y, z).
+        Orientation of a joint frame at zero in its parent: quaternion (w, x, y,
+        z).
     axis : ndarray, shape (n, 3)
         Unit vector of a joint's axis in its own frame.
     tool : ndarray, shape (3,)
@@ -116,9 +117,11 @@ class MotionBounds(NamedTuple):
         Bound on the second derivative of the tool point p by two axes [m/rad^2]: p(q + e) differs
         from p(q) + J e by at most half the sum of |e_i| |e_j| curvature_ij.
     swing : ndarray, shape (n, n)
-        Bound on the speed of a joint frame's origin (column) by a joint (row) [m/rad].
+        Bound on the speed of a joint frame's origin (column) by a joint (row)
+        [m/rad].
     length : ndarray, shape (n,)
-        Bound on the distance from the origin of a joint frame to the tool point [m].
+        Bound on the distance from the origin of a joint frame to the tool point
+        [m].
     """
 
     curvature: NDArray[np.float64]
@@ -158,15 +161,16 @@ def link_lengths(chain: Chain) -> NDArray[np.float64]:
 def point_speed(chain: Chain, axis: int, link: int, points: NDArray[np.float64]) -> float:
     """Bound on the speed of points of a link per unit speed of a joint [m/rad, or m/m].
 
-    A revolute joint moves a point by its distance from the axis: at most that of the next joint,
-    and the lengths of the links beyond.
+    A revolute joint moves a point by its distance from the axis: at most that
+    of the next joint, and the lengths of the links beyond.
 
     Parameters
     ----------
     chain : Chain
         The arm's kinematics.
     axis, link : int
-        The joint, from 0, and the link, from 1: link k is that of the k-th joint.
+        The joint, from 0, and the link, from 1: link k is that of the k-th
+        joint.
     points : ndarray, shape (n, 3)
         Points in the link's frame, whose convex hull is bounded [m].
     """

@@ -28,8 +28,9 @@ class Clearance(NamedTuple):
     Attributes
     ----------
     distance : ndarray, shape (...,)
-        How far the closest pair is apart [m]; in contact, minus the way to come apart. Within
-        2e-6 m of contact, only Coal's verdicts on capsules, spheres and the ground surely agree.
+        How far the closest pair is apart [m]; in contact, minus the way to come
+        apart. Within 2e-6 m of contact, only Coal's verdicts on capsules,
+        spheres and the ground surely agree.
     bodies : ndarray of str, shape (..., 2)
         Names of the two.
     points : ndarray, shape (..., 2, 3)
@@ -46,9 +47,9 @@ def measure_clearance(
 ) -> Clearance:
     """Find the closest tested pair of each configuration.
 
-    Kernels measure capsules, spheres, boxes, convex hulls and the ground, to within 1e-10 m. Coal
-    measures cylinders that may be closest, and overlapping shapes, of capsules and spheres only
-    overlaps deeper than their radii.
+    Kernels measure capsules, spheres, boxes, convex hulls and the ground, to
+    within 1e-10 m. Coal measures cylinders that may be closest, and overlapping
+    shapes, of capsules and spheres only overlaps deeper than their radii.
 
     Parameters
     ----------
@@ -199,8 +200,8 @@ GOALS, MANY = 100, 0.1
 def find_reachable(world: "World", goals: Array, configurations: int = 50_000) -> NDArray[np.bool_]:
     """Find out which goals have a configuration without contact.
 
-    Random configurations are tried first, then inverse kinematics. An arm that always touches
-    something is refused.
+    Random configurations are tried first, then inverse kinematics. An arm that
+    always touches something is refused.
 
     Parameters
     ----------

@@ -56,9 +56,10 @@ class Contact(NamedTuple):
 class ContactModel:
     """An arm in a scene, with the pairs of bodies that are tested for contact.
 
-    Left out are neighbours in the chain, bodies that overlap at the home pose, those that the arm's
-    file allows, and the mounting: base and first link against a world that they never touch or
-    always touch. A configuration is an array of shape (n_joints,) [rad or m].
+    Left out are neighbours in the chain, bodies that overlap at the home pose,
+    those that the arm's file allows, and the mounting: base and first link
+    against a world that they never touch or always touch. A configuration is an
+    array of shape (n_joints,) [rad or m].
 
     Attributes
     ----------

@@ -139,23 +139,27 @@ def _capsule_around(points: Array) -> Enclosure:
 class ContactShapes(NamedTuple):
     """Shapes, pairs and motion bounds as flat arrays.
 
-    A *body* is a rounded polytope about a shape of the arm or, after those, an obstacle; last come
-    finer polytopes about shapes whose first one is coarse.
+    A *body* is a rounded polytope about a shape of the arm or, after those, an
+    obstacle; last come finer polytopes about shapes whose first one is coarse.
 
     Attributes
     ----------
     capsules : ndarray, shape (n_shapes, 7)
-        Capsule that is or encloses the shape: end points (3 + 3) in the joint frame, radius [m].
+        Capsule that is or encloses the shape: end points (3 + 3) in the joint
+        frame, radius [m].
     boxes : ndarray, shape (n_boxes, 2, 3)
-        Lower and upper corners of the obstacles, in the world turned back by their yaw [m].
+        Lower and upper corners of the obstacles, in the world turned back by
+        their yaw [m].
     pairs : ndarray of int, shape (n_pairs, 3)
         Kind, index of a shape, and index of the other shape or box.
     travel : ndarray, shape (n_actuated, n_pairs)
-        Bound on how far a joint moves the bodies of a pair relative to each other [m/rad, or m/m].
+        Bound on how far a joint moves the bodies of a pair relative to each
+        other [m/rad, or m/m].
     exact : ndarray of bool, shape (n_shapes,)
         Whether the capsule equals the shape.
     bodies : ndarray of int, shape (n_bodies, 3)
-        First corner, the one after the last, and joint frame: 0 is the world, k the k-th joint.
+        First corner, the one after the last, and joint frame: 0 is the world, k
+        the k-th joint.
     corners : ndarray, shape (n_corners, 3)
         Corners in that frame [m].
     rounding : ndarray, shape (n_bodies,)
@@ -163,8 +167,8 @@ class ContactShapes(NamedTuple):
     extents : ndarray, shape (n_bodies, 2, 3)
         Lower and upper ends of the corners [m].
     planes : ndarray of int, shape (n_pairs, 4)
-        Carrier of the separating plane, or ``GROUND``; mover against it; its first axis, and the
-        one after the last.
+        Carrier of the separating plane, or ``GROUND``; mover against it; its
+        first axis, and the one after the last.
     proxies : ndarray of int, shape (n_pairs, 2, 2)
         Bodies that stand for these two: in every step, and where it is close.
     farthest : ndarray, shape (n_actuated,)
@@ -203,7 +207,8 @@ class ContactShapes(NamedTuple):
         arm, scene : Arm and Scene
             What may touch.
         pairs : list of tuple
-            Shapes of each pair; obstacles count from ``n_shapes``, the ground comes last.
+            Shapes of each pair; obstacles count from ``n_shapes``, the ground
+            comes last.
         n_shapes : int
             The arm's shapes.
         close : collection of int

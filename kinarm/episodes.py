@@ -80,18 +80,20 @@ class Episodes(NamedTuple):
     Attributes
     ----------
     status, steps, stop : ndarray of int, shape (n,)
-        `RUNNING`, `PAUSED`, `SUCCESS`, `COLLISION` or `TRUNCATED`; steps taken; step at which to
-        hand an episode back.
+        `RUNNING`, `PAUSED`, `SUCCESS`, `COLLISION` or `TRUNCATED`; steps taken;
+        step at which to hand an episode back.
     q, target : ndarray, shape (n, n_joints)
         Configuration, and target of the step under way [rad or m].
     doubt : ndarray of int, shape (n,)
         Bit k - 1 set: configuration k of the step is not proven free.
     touched : ndarray of int, shape (n,)
-        Number, from 1, of the pair that refused the last step; 0 if none or unknown.
+        Number, from 1, of the pair that refused the last step; 0 if none or
+        unknown.
     cleared : ndarray of bool, shape (n,)
         Coal has found the step under way free.
     planes : ndarray, shape (n, n_pairs, PLANE)
-        Separating plane of each pair and height above it at ``q``; see ``kinarm.kernels.planes``.
+        Separating plane of each pair and height above it at ``q``; see
+        ``kinarm.kernels.planes``.
     goal, distance : ndarray, shape (n, 3) and (n,)
         Goal position, and the tool's distance from it [m].
     observation : ndarray, shape (n, n_observations)
@@ -136,10 +138,11 @@ class StepResult(NamedTuple):
     Attributes
     ----------
     numbers : ndarray, shape (2 + n_terms, n)
-        Rewards, distances to the goal [m], and weighted terms, as in `kinarm.REWARD_TERMS`.
-        Rewards are zero for episodes that were over.
+        Rewards, distances to the goal [m], and weighted terms, as in
+        `kinarm.REWARD_TERMS`. Rewards are zero for episodes that were over.
     flags : ndarray of bool, shape (3, n)
-        Truncation, success and refusal by contact; false for episodes that go on or were over.
+        Truncation, success and refusal by contact; false for episodes that go
+        on or were over.
     contact : ndarray of int, shape (n,)
         Number, from 1, of the pair that refused the step; 0 if none or unknown.
     """
@@ -203,7 +206,8 @@ class Rollouts:
     steps, distance, returns : ndarray, shape (n,)
         Steps taken, final distances to the goal [m], and sums of rewards.
     configurations, targets : ndarray, shape (n, n_joints)
-        Final configurations, and where the last step led, which differs if it was refused.
+        Final configurations, and where the last step led, which differs if it
+        was refused.
     moments : ndarray, shape (n, 2, n_observations), or empty
         Sums of the observations acted upon, less the shift, and their squares.
     paths : ndarray, shape (n, horizon + 1, n_joints), or empty
@@ -229,7 +233,8 @@ class Rollouts:
         Parameters
         ----------
         starts, episodes
-            Where they started, shape (n, n_joints) [rad or m], and the episodes.
+            Where they started, shape (n, n_joints) [rad or m], and the
+            episodes.
         copy : bool
             Copy their arrays, which may then serve others.
         """

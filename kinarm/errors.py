@@ -241,8 +241,9 @@ def check_range(name: str, value: Any, demands: Mapping[str, Any]) -> None:
     value : object
         Its value, or a tuple of such; anything but numbers passes.
     demands : mapping
-        Metadata of the field. For whole numbers: ``at_least``, 1 by default, and ``at_most``. For
-        others: a condition that ``holds``, and what they ``must`` in words.
+        Metadata of the field. For whole numbers: ``at_least``, 1 by default,
+        and ``at_most``. For others: a condition that ``holds``, and what they
+        ``must`` in words.
     """
     if isinstance(value, tuple):
         for each in value:

@@ -22,9 +22,9 @@ LARGEST_REPLAY = 1_000_000
 class FailedScenarios(NamedTuple):
     """Scenarios of the last episodes that failed, oldest first.
 
-    One that failed k times among the last ``size`` failures is held k times, and all are replayed
-    with equal chance. A mastered one is forgotten after ``size`` failures of others. Those that
-    always fail can displace all others.
+    One that failed k times among the last ``size`` failures is held k times,
+    and all are replayed with equal chance. A mastered one is forgotten after
+    ``size`` failures of others. Those that always fail can displace all others.
 
     Attributes
     ----------
@@ -82,7 +82,8 @@ class FailedScenarios(NamedTuple):
         Returns
         -------
         tuple
-            Starts and goals, and which failed before, an array of bool of shape (count,).
+            Starts and goals, and which failed before, an array of bool of shape
+            (count,).
         """
         every = np.arange(count)
         if not share or not len(self.goals):

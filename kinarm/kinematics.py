@@ -43,11 +43,13 @@ class InverseSolutions:
     Attributes
     ----------
     configurations : ndarray, shape (m, n_joints)
-        Target by target, those of one with the smallest largest move first [rad or m].
+        Target by target, those of one with the smallest largest move first [rad
+        or m].
     owner : ndarray of int, shape (m,)
         Target of each.
     isolated : bool
-        Whether solutions are isolated and complete; else they are spread over a continuum.
+        Whether solutions are isolated and complete; else they are spread over a
+        continuum.
     """
 
     configurations: Array
@@ -96,7 +98,8 @@ class Kinematics(ABC):
         configurations : array_like, shape (n_joints,) or (n, n_joints)
             Joint positions [rad or m].
         frame : str, optional
-            Name of a joint or link; the tool by default, its origin in the tool point.
+            Name of a joint or link; the tool by default, its origin in the tool
+            point.
 
         Returns
         -------
@@ -116,8 +119,8 @@ class Kinematics(ABC):
         Returns
         -------
         ndarray, shape (6, n_joints) or (n, 6, n_joints)
-            Velocity of the frame's origin, then angular velocity, along the world's axes
-            [m/rad and rad/rad; m/m and 0 of a sliding joint].
+            Velocity of the frame's origin, then angular velocity, along the
+            world's axes [m/rad and rad/rad; m/m and 0 of a sliding joint].
         """
         return self._of_frame(configurations, frame, (6, self.arm.n_joints))
 
@@ -149,35 +152,38 @@ class Kinematics(ABC):
     ) -> InverseSolutions:
         """Find all configurations within the limits that bring the tool to positions or poses.
 
-        Damped Newton steps move seeds to an error of 1e-10 of the arm's reach and 1e-10 rad.
-        Solutions are *isolated*, and each is returned once, if no more joints move than the target
-        has coordinates: 3 of a position, 5 with a direction, 6 of a pose. Else, and at singular
-        configurations, they are spread over a continuum. Targets do not affect each other.
+        Damped Newton steps move seeds to an error of 1e-10 of the arm's reach
+        and 1e-10 rad. Solutions are *isolated*, and each is returned once, if
+        no more joints move than the target has coordinates: 3 of a position, 5
+        with a direction, 6 of a pose. Else, and at singular configurations,
+        they are spread over a continuum. Targets do not affect each other.
 
         Parameters
         ----------
         targets : array_like, shape (3,), (n, 3), (4, 4) or (n, 4, 4)
-            Positions of the tool point [m], or poses of the tool as `poses` gives them.
+            Positions of the tool point [m], or poses of the tool as `poses`
+            gives them.
         directions : array_like, shape (3,) or (n, 3), optional
             Directions of the tool's axis.
         near : array_like, shape (n_joints,), optional
-            Solutions nearest to it come first; of whole turns the nearest is returned. Joints that
-            do not move rest there. Home by default [rad or m].
+            Solutions nearest to it come first; of whole turns the nearest is
+            returned. Joints that do not move rest there. Home by default [rad
+            or m].
         free : bool
             Keep only solutions without contact.
         tool_axis : array_like, shape (3,), optional
-            The tool's axis in the tool frame; by default along the last joint's axis, away from the
-            joint before.
+            The tool's axis in the tool frame; by default along the last joint's
+            axis, away from the joint before.
         joints : int, optional
-            Number of joints that move, from the base; by default the actuated ones for positions,
-            and all that matter for poses.
+            Number of joints that move, from the base; by default the actuated
+            ones for positions, and all that matter for poses.
         turns : bool
             Give solutions that differ by whole turns one by one.
         most : int
             Largest number of solutions of a target, before contact and turns.
         separation : float, optional
-            Least difference of two solutions in some joint; by default 0.001 if they are isolated,
-            else 0.2 [rad or m].
+            Least difference of two solutions in some joint; by default 0.001 if
+            they are isolated, else 0.2 [rad or m].
         """
         arm = self.arm
         positions, wanted, axes = self._targets(targets, directions, tool_axis)

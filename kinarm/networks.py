@@ -88,11 +88,12 @@ class Networks:
     layers : ndarray of int, shape (n_layers + 1,)
         Widths, from the observation to the action.
     weights : ndarray, shape (n_networks, n_parameters)
-        Per network and layer, weights (inputs x outputs, row by row), then the bias.
+        Per network and layer, weights (inputs x outputs, row by row), then the
+        bias.
     activations : tuple of str
-        Function after each layer, the last one before the clip: ``"linear"``, ``"tanh"``,
-        ``"relu"``, ``"hardtanh"``, ``"elu"``, ``"leaky_relu"`` or ``"silu"``; by default tanh
-        between layers, none after the last.
+        Function after each layer, the last one before the clip: ``"linear"``,
+        ``"tanh"``, ``"relu"``, ``"hardtanh"``, ``"elu"``, ``"leaky_relu"`` or
+        ``"silu"``; by default tanh between layers, none after the last.
     mirror : Mirror or None
         Reflection of goals on the left, and of actions; None for no reflection.
     """

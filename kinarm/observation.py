@@ -75,7 +75,8 @@ def write_goal(
     poses : ndarray, shape (n_joints + 1, POSE)
         Forward kinematics; see `kinarm.kernels.kinematics.forward_kinematics`.
     tool, goals
-        The tool point, and goal points, shape (n_episodes, 3), in the world [m].
+        The tool point, and goal points, shape (n_episodes, 3), in the world
+        [m].
     e, k : int
         Episode, and joint from 1; 0 if the part is not per joint.
     observations, start

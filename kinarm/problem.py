@@ -82,8 +82,9 @@ class ReachProblem(Checked):
         Parameters
         ----------
         problem : str, Path, mapping or ReachProblem
-            ``"left"``, ``"right"`` or ``"both"``, the paper's tasks 1, 2 and 3, or another of
-            `problem_names`; the path of a TOML file; what `to_json` returned; or a problem.
+            ``"left"``, ``"right"`` or ``"both"``, the paper's tasks 1, 2 and 3,
+            or another of `problem_names`; the path of a TOML file; what
+            `to_json` returned; or a problem.
         """
         if isinstance(problem, ReachProblem):
             return problem
@@ -101,11 +102,13 @@ class ReachProblem(Checked):
         Parameters
         ----------
         **overrides
-            ``name``; ``arm`` (a name, a path or a specification), ``scene`` and ``task`` (by
-            name, of a file, of another problem, or themselves), ``stepping``; ``reward``
-            (weights, or a mapping of those that change); or any field of the task or the
-            stepping, such as ``tolerance``. None changes nothing. With another scene, by name or
-            file, that lacks a goal region of the task, all its regions are to be reached.
+            ``name``; ``arm`` (a name, a path or a specification), ``scene`` and
+            ``task`` (by name, of a file, of another problem, or themselves),
+            ``stepping``; ``reward`` (weights, or a mapping of those that
+            change); or any field of the task or the stepping, such as
+            ``tolerance``. None changes nothing. With another scene, by name or
+            file, that lacks a goal region of the task, all its regions are to
+            be reached.
         """
         given = {name: value for name, value in overrides.items() if value is not None}
         if not given:

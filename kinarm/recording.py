@@ -48,7 +48,8 @@ class Recording:
     outcome : str
         ``"success"``, ``"collision"`` or ``"truncated"``.
     contact, contact_point : tuple of str and ndarray, shape (3,), optional
-        The two bodies that would have touched, and where [m], if the last move was refused.
+        The two bodies that would have touched, and where [m], if the last move
+        was refused.
     refused : ndarray, shape (n_joints,), optional
         Configuration of the refused move at which they touch first [rad or m].
     steps_lower_bound : int, optional
@@ -59,7 +60,8 @@ class Recording:
     Raises
     ------
     InvalidInputError
-        If shapes do not match, an entry is not finite or the outcome is unknown.
+        If shapes do not match, an entry is not finite or the outcome is
+        unknown.
     """
 
     policy: str
@@ -239,9 +241,9 @@ def record_path(
 ) -> Recording:
     """Record what an arm does on a path.
 
-    It moves straight to each next configuration, as fast as its joints allow and in at least a
-    step. All joints move, whether actuated or not. A step that touches something is refused and is
-    the last.
+    It moves straight to each next configuration, as fast as its joints allow
+    and in at least a step. All joints move, whether actuated or not. A step
+    that touches something is refused and is the last.
 
     Parameters
     ----------

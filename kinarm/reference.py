@@ -29,7 +29,8 @@ class ReferenceEpisode(NamedTuple):
     success, collision : bool
         How it ended; neither means truncation at the horizon.
     distance, contact
-        The tool's final distance from the goal [m], and the first pair in contact, if any.
+        The tool's final distance from the goal [m], and the first pair in
+        contact, if any.
     """
 
     path: Array
@@ -61,7 +62,8 @@ class ReferenceSimulator:
         Parameters
         ----------
         policy : callable
-            Maps an observation, shape (n_observations,), to an action, shape (n_actions,).
+            Maps an observation, shape (n_observations,), to an action, shape
+            (n_actions,).
         start, goal : ndarray, shape (n_joints,) and (3,)
             Start configuration [rad or m] and goal position [m].
         """

@@ -20,10 +20,11 @@ def draw_scenarios(
 ) -> tuple[Array, Array]:
     """Draw starts, shape (count, n_joints) [rad or m], and goals, shape (count, 3) [m].
 
-    Goals are uniform over the task's regions. Each actuated joint starts uniformly within its
-    limits, scaled by the start spread, or the arm starts at one of the task's configurations,
-    without contact and farther from the goal than the tolerance. If none is found in 2000 attempts,
-    that is a `kinarm.ProblemError`.
+    Goals are uniform over the task's regions. Each actuated joint starts
+    uniformly within its limits, scaled by the start spread, or the arm starts
+    at one of the task's configurations, without contact and farther from the
+    goal than the tolerance. If none is found in 2000 attempts, that is a
+    `kinarm.ProblemError`.
 
     Parameters
     ----------
@@ -45,7 +46,8 @@ def draw_for_each(
 ) -> tuple[Array, Array]:
     """Draw starts and goals from several generators, and screen them together.
 
-    Generators give the same numbers as in `draw_scenarios`, along a further first axis.
+    Generators give the same numbers as in `draw_scenarios`, along a further
+    first axis.
 
     Parameters
     ----------

@@ -143,8 +143,9 @@ PAPER_GOALS = (
 class Scene(Checked):
     """Ground, obstacles and goal regions.
 
-    The world frame has z up, x forward (the arm's zero heading) and y to the left. By default the
-    arm's base is at the origin, in the paper's scene (section 3.3): a bench on each side of it.
+    The world frame has z up, x forward (the arm's zero heading) and y to the
+    left. By default the arm's base is at the origin, in the paper's scene
+    (section 3.3): a bench on each side of it.
 
     Parameters
     ----------

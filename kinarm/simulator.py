@@ -30,14 +30,16 @@ PolicyFunction = Callable[[Array], ArrayLike]
 class Simulator:
     """Steps batches of rate-limited joint kinematics with contact checks.
 
-    An action in [-1, 1] (clipped) moves its joint by at most its velocity limit times the time
-    step, within the limits. A step is tested for contact at evenly spaced configurations up to its
-    end; a move that touches something is refused and ends the episode, as does the tool within the
-    tolerance of the goal. Episodes are truncated at the horizon.
+    An action in [-1, 1] (clipped) moves its joint by at most its velocity limit
+    times the time step, within the limits. A step is tested for contact at
+    evenly spaced configurations up to its end; a move that touches something is
+    refused and ends the episode, as does the tool within the tolerance of the
+    goal. Episodes are truncated at the horizon.
 
-    Results depend on the inputs alone: not on threads, nor on batches. Arrays of a wrong shape,
-    entries that are not finite and starts more than 1e-6 beyond the limits are a
-    `kinarm.InvalidInputError`, starts that touch something a `kinarm.StartInContactError`.
+    Results depend on the inputs alone: not on threads, nor on batches. Arrays
+    of a wrong shape, entries that are not finite and starts more than 1e-6
+    beyond the limits are a `kinarm.InvalidInputError`, starts that touch
+    something a `kinarm.StartInContactError`.
 
     Parameters
     ----------
@@ -162,9 +164,9 @@ class Simulator:
         Parameters
         ----------
         policies : Networks, policy, sequence of policies, or function
-            One policy for all episodes, or one for each. Those with ``networks()`` run compiled; a
-            function from observations (n, n_observations) to actions (n, n_actions) is called once
-            a step.
+            One policy for all episodes, or one for each. Those with
+            ``networks()`` run compiled; a function from observations (n,
+            n_observations) to actions (n, n_actions) is called once a step.
         starts, goals, record
             As for `reset`.
         policy_index : array_like of int, shape (n,), optional

@@ -24,13 +24,16 @@ class RewardWeights(Checked):
     Parameters
     ----------
     progress : float
-        Reward per metre by which the tool comes closer to the goal in a step [1/m].
+        Reward per metre by which the tool comes closer to the goal in a step
+        [1/m].
     closer : float
-        Added in a step that brings the tool closer, subtracted in one that takes it farther.
+        Added in a step that brings the tool closer, subtracted in one that
+        takes it farther.
     step : float
         Added in every step; negative to reward haste.
     collision : float
-        Added once when a move touches something and the episode ends; usually negative.
+        Added once when a move touches something and the episode ends; usually
+        negative.
     success : float
         Added once when the tool comes within the tolerance.
     allow_perverse : bool
@@ -116,8 +119,8 @@ class ReachTask(Checked):
     horizon : int
         Steps after which an episode is truncated.
     start_spread : float
-        Scales the range of the start configurations about the home pose; 1 is the whole range
-        of every actuated joint, 0 always starts at home.
+        Scales the range of the start configurations about the home pose; 1 is
+        the whole range of every actuated joint, 0 always starts at home.
     starts : tuple
         Start configurations, each as likely, instead of that range [rad or m].
     reward : RewardWeights
@@ -161,8 +164,8 @@ class Stepping(Checked):
     time_step : float
         Duration of a step [s].
     tested_configurations : int
-        Evenly spaced configurations, from 1 to 32, at which the motion of a step is tested for
-        contact, its end included.
+        Evenly spaced configurations, from 1 to 32, at which the motion of a
+        step is tested for contact, its end included.
     """
 
     time_step: float = field(default=0.02, metadata=POSITIVE)

@@ -21,11 +21,11 @@ ARCHIVE = ("checkpoint", 2)
 """Kind and version of the files."""
 
 CHECKPOINT_SECONDS = 5.0
-"""How often a training saves how far it is [s]."""
+"""Time between checkpoints of a training [s]."""
 
 
 class Checkpoint(NamedTuple):
-    """A training that was stopped: its settings, and the state from which it goes on."""
+    """An unfinished training: its settings, and the state to go on from."""
 
     config: Any
     state: Any
@@ -34,7 +34,7 @@ class Checkpoint(NamedTuple):
 def save_checkpoint(
     path: str | Path | IO[bytes], config: TrainingConfig, state: TrainingState, beside: Any = None
 ) -> None:
-    """Write the state of a training, replacing an earlier checkpoint only when complete.
+    """Write the state of a training; only a complete file replaces an earlier one.
 
     Parameters
     ----------
@@ -63,7 +63,8 @@ def load_checkpoint(path: str | Path) -> Checkpoint:
     Raises
     ------
     PolicyFileError
-        If the file is missing, truncated or not a checkpoint, or if the arm has changed since.
+        If the file is missing, truncated or not a checkpoint, or the arm has
+        changed.
     """
     header, arrays = load_archive(path, *ARCHIVE, PolicyFileError)
     name = repr(str(path))
@@ -80,7 +81,7 @@ def load_checkpoint(path: str | Path) -> Checkpoint:
 
 
 def load_beside(path: Path, kind: type[T]) -> T:
-    """Read what a checkpoint holds beside the state, which is of some type."""
+    """Read what a checkpoint holds beside the state."""
     _, arrays = load_archive(path, *ARCHIVE, PolicyFileError, unless=("state.",))
     with reading(repr(str(path)), "checkpoint", PolicyFileError):
         value: T = rebuilt(kind, "beside", arrays)
@@ -88,16 +89,16 @@ def load_beside(path: Path, kind: type[T]) -> T:
 
 
 def load_share(path: Path) -> float:
-    """Read which share of the iterations of a training is done."""
+    """Read which share of the iterations is done."""
     header, _ = load_archive(path, *ARCHIVE, PolicyFileError, unless=("state.", "beside."))
     with reading(repr(str(path)), "checkpoint", PolicyFileError):
         return float(header["iteration"] / header["config"]["iterations"])
 
 
 def arrays_of(name: str, value: Any) -> dict[str, NDArray[Any]]:
-    """Flatten a value into arrays; parts of records get names such as ``state.theta``.
+    """Flatten a value into arrays with names such as ``state.theta``.
 
-    Dictionaries are kept as JSON, tuples of numbers and of named tuples of them as tables.
+    Dictionaries become JSON, tuples of numbers or named tuples tables.
     """
     if is_dataclass(value) or hasattr(value, "_fields"):
         parts = [(part, getattr(value, part)) for part in _field_names(type(value))]
@@ -117,12 +118,12 @@ def rebuilt(kind: Any, name: str, arrays: Arrays) -> Any:
     name : str
         Name that its arrays have, or begin with.
     arrays : mapping of str to ndarray
-        All arrays, of whatever shapes the value has.
+        All arrays, of any shape.
 
     Raises
     ------
     InvalidInputError
-        If an array has another type of numbers, or one that is not finite.
+        If an array has another type, or numbers that are not finite.
     """
     if is_dataclass(kind) or hasattr(kind, "_fields"):
         hints = get_type_hints(kind)
@@ -147,7 +148,7 @@ def rebuilt(kind: Any, name: str, arrays: Arrays) -> Any:
 
 
 def _field_names(kind: Any) -> Iterable[str]:
-    """Names of the fields of a dataclass or named tuple that are saved."""
+    """Names of saved fields of a dataclass or named tuple."""
     if not is_dataclass(kind):
         return tuple(kind._fields)
     return [item.name for item in fields(kind) if "unsaved" not in item.metadata]

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from kinarm.simulator import Simulator
 
 Schedule = Literal["constant", "linear"]
-"""Whether a setting stays or falls linearly to zero in the course of a training."""
+"""Whether a setting stays or falls linearly to zero in a training."""
 
 
 def scheduled(value: float, schedule: Schedule, done: float) -> float:
@@ -35,19 +35,19 @@ def scheduled(value: float, schedule: Schedule, done: float) -> float:
 
 
 MANY, WIDTHS = {"at_most": 100_000}, {"at_most": 4096}
-"""Metadata of whole numbers that memory grows with, and of the widths of hidden layers."""
+"""Metadata of numbers that memory grows with, and of widths of layers."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class TrainingConfig(Checked):
-    """Settings of a training with any learner, which adds its own.
+    """Settings of all learners, which add their own.
 
     Parameters
     ----------
     problem : ReachProblem
-        The problem that the policy is for; a name or a file will do.
+        The problem of the policy, its name or its file.
     reward : RewardWeights, optional
-        What the learner is rewarded for; what the task rewards if it is not given.
+        What the learner is rewarded for; by default as in the task.
     seed : int
         Seed of all randomness.
     recipe : str
@@ -68,17 +68,17 @@ class TrainingConfig(Checked):
 
     @property
     def training_problem(self) -> ReachProblem:
-        """The problem with the reward of these settings, on which the training runs."""
+        """The problem with the reward of these settings."""
         return self.problem.replace(reward=self.reward)
 
     @property
     def learner(self) -> str:
-        """Name by which the learner is found; ``LEARNER`` of its module if it says no more."""
+        """Name of the learner; by default ``LEARNER`` of its module."""
         return f"{type(self).__module__}:LEARNER"
 
     @property
     def can_extend(self) -> bool:
-        """Whether a training with more iterations begins just as this one goes."""
+        """Whether a longer training begins just as this one goes."""
         return False
 
     def simulator(self, threads: int | None = None) -> "Simulator":
@@ -88,7 +88,7 @@ class TrainingConfig(Checked):
         return Simulator(self.training_problem, threads=threads)
 
     def changed(self, changes: Mapping[str, Any]) -> "TrainingConfig":
-        """Replace fields; a mapping replaces weights of the reward, or entries, that it names."""
+        """Replace fields; a mapping replaces weights or entries that it names."""
         given = dict(changes)
         for name, value in changes.items():
             if isinstance(value, Mapping) and isinstance(own := getattr(self, name), Mapping):

@@ -1,8 +1,7 @@
-"""The contract of a learner, the one way to find learners, and the loop that they all train in.
+"""The contract of learners, how they are found, and the loop that trains them.
 
-A learner is an attribute ``LEARNER`` of a module, such as `kinarm.policies.ars`; it needs no base
-class. Those of other packages are found by the name that the package gives them in the entry-point
-group ``kinarm.learners``, or as ``module:LEARNER``, wherever a learner is named, in every process.
+A learner is an attribute ``LEARNER`` of a module, such as `kinarm.policies.ars`. Those of other
+packages are found by name in the entry-point group ``kinarm.learners``, or as ``module:LEARNER``.
 """
 
 import sys
@@ -24,17 +23,17 @@ if TYPE_CHECKING:
 
 
 class CurvePoint(NamedTuple):
-    """A point of a learning curve: one iteration of the training.
+    """A point of a learning curve: one iteration.
 
     Attributes
     ----------
     mean_return, std_return, success : float
-        Mean and standard deviation of the returns of the iteration's episodes, and the share that
-        reached the goal; for PPO, of those that ended in it, and for algorithms of
-        Stable-Baselines3, of the last hundred that ended. Episodes that replayed a failed scenario
-        do not count; NaN if none does.
+        Mean and standard deviation of the returns of the iteration's episodes,
+        and share of success; for PPO, of those that ended in it, and for
+        Stable-Baselines3, of the last hundred that ended. Replays of failed
+        scenarios do not count; NaN if no episode does.
     environment_steps, wall_time : int and float
-        Steps taken, and time that iterations took [s], since the training began.
+        Steps and time of the iterations [s] since the training began.
     """
 
     mean_return: float
@@ -48,8 +47,8 @@ class CurvePoint(NamedTuple):
 class TrainingState:
     """Everything that the next iteration depends on; learners add fields of their own.
 
-    A checkpoint holds all fields: numbers, arrays, dictionaries that JSON can hold, and
-    dataclasses or named tuples of these. The curve has one point per finished iteration.
+    A checkpoint holds all fields: numbers, arrays, dictionaries for JSON, and dataclasses or named
+    tuples of these. The curve has one point per finished iteration.
     """
 
     curve: tuple[CurvePoint, ...] = ()
@@ -66,7 +65,7 @@ class TrainingState:
 
     @property
     def wall_time(self) -> float:
-        """Time that the iterations took so far [s]."""
+        """Time of the iterations so far [s]."""
         return self.curve[-1].wall_time if self.curve else 0.0
 
 
@@ -74,13 +73,13 @@ StateT = TypeVar("StateT", bound=TrainingState)
 
 
 class Training(Protocol[StateT]):
-    """A running training: built once, it serves every iteration."""
+    """A running training, built once."""
 
     def initial_state(self) -> StateT:
         """State before the first iteration."""
 
     def iterate(self, state: StateT) -> StateT:
-        """One iteration: the state after it, whose curve has one more point."""
+        """The state after one iteration, whose curve has one more point."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -90,13 +89,13 @@ class Learner(Generic[ConfigT, StateT]):
     Parameters
     ----------
     name, title : str
-        Its name on the command line and in files, and in words.
+        Name in commands and files, and in words.
     config, state : type
         Settings, and state of a training.
     recipes : mapping of str to config
-        Settings by name; the first of them where none is named.
+        Settings by name; the first one is the default.
     summaries : mapping of str to str
-        What recipes are, in a few words by name, for help.
+        What recipes are, in a few words, for help.
     begin : callable
         Prepares a training, given settings and options.
     policy : callable
@@ -106,7 +105,7 @@ class Learner(Generic[ConfigT, StateT]):
     options : tuple of str
         Names of the options that ``begin`` takes.
     packages, extra : tuple of str, and str
-        Modules that it needs beyond what kinarm requires, and the extra that brings them.
+        Modules that it needs beyond kinarm's, and the extra that brings them.
     """
 
     name: str
@@ -124,23 +123,23 @@ class Learner(Generic[ConfigT, StateT]):
 
     @property
     def first_recipe(self) -> str:
-        """Name of the recipe that is taken where none is named."""
+        """Name of the default recipe."""
         return next(iter(self.recipes))
 
     def check_installed(self) -> None:
-        """Refuse to go on without the packages that the learner needs."""
+        """Refuse to go on without the packages it needs."""
         for package in self.packages:
             if find_spec(package) is None:
                 raise MissingExtraError(package, self.extra)
 
 
 def imported(module: str, name: str) -> Callable[..., Any]:
-    """A callable of a module that is imported when it is first called: it takes long to load."""
+    """A callable of a module that is imported late, since it takes long."""
     return lambda *given, **options: getattr(import_module(module), name)(*given, **options)
 
 
 class TrainingResult(NamedTuple):
-    """A trained policy, its learning curve, and the `TrainingState` that it was made of."""
+    """A trained policy, its learning curve, and its `TrainingState`."""
 
     policy: "Policy"
     curve: tuple[CurvePoint, ...]
@@ -170,22 +169,22 @@ _SHIPPED = {
 
 @cache
 def _installed() -> dict[str, str]:
-    """Where the learners of installed packages are, by name."""
+    """Places of the learners of installed packages, by name."""
     return {point.name: point.value for point in entry_points(group=GROUP)}
 
 
 def learner_names() -> tuple[str, ...]:
-    """Names of kinarm's learners and of those that installed packages bring."""
+    """Names of learners, kinarm's and those of installed packages."""
     return tuple({**_SHIPPED, **_installed()})
 
 
 def find_learner(name: str) -> Learner[Any, Any]:
-    """Look a learner up by name, or as ``module:LEARNER``, also of the current directory.
+    """Look a learner up by name or ``module:LEARNER``, also in the current folder.
 
     Raises
     ------
     InvalidInputError
-        If there is no such learner, it cannot be imported, or is something else.
+        If there is none, it cannot be imported, or is something else.
     """
     place = name if ":" in name else _SHIPPED.get(name) or _installed().get(name)
     if place is None:
@@ -216,12 +215,12 @@ def train_policy(
     config : ARSConfig, PPOConfig or settings of another learner
         The settings.
     state : TrainingState, optional
-        Where to go on; the result equals that of an uninterrupted training bit for bit.
+        Where to go on, bit for bit as without an interruption.
     on_iteration : callable, optional
         Called with the state after every iteration.
     **options
-        What does not change the result: ``threads``, and the folder of the ``tensorboard`` logs
-        for PPO.
+        What does not change the result: ``threads``, and for PPO the folder of
+        ``tensorboard`` logs.
     """
     states = training_states(config, state, **options)
     last = next(states)
@@ -234,7 +233,7 @@ def train_policy(
 def training_states(
     config: TrainingConfig, state: TrainingState | None = None, **options: Any
 ) -> Iterator[Any]:
-    """States of a training: the given one or the initial one, then one after every iteration.
+    """States of a training: the given or initial one, then one per iteration.
 
     Parameters
     ----------
@@ -256,5 +255,5 @@ def training_states(
 
 
 def state_policy(config: TrainingConfig, state: TrainingState) -> "Policy":
-    """Freeze a state of a training into a policy, with all that belongs to it."""
+    """Freeze a state of a training into a policy."""
     return find_learner(config.learner).policy(config, state)

@@ -1,4 +1,4 @@
-"""The policies that ship with kinarm; loading by name, group or file, also to train on from."""
+"""The shipped policies, and loading by name, group or file."""
 
 import json
 import re
@@ -16,13 +16,13 @@ from kinarm.policies.training import CHECKPOINT
 from kinarm.problem import ProblemLike, ReachProblem
 
 BEST = "best"
-"""Stands for the best shipped policy for a problem."""
+"""Name of the best shipped policy for a problem."""
 
 RANKING = "ranking.json"
-"""Which shipped policies are best, beside them: see docs/ranking.py."""
+"""File of the best shipped policies, by docs/ranking.py."""
 
 SEEN = 10_000
-"""Observations that the statistics of an initial policy count for: new ones soon outweigh them."""
+"""Weight of an initial policy's statistics, in observations; new ones soon outweigh it."""
 
 
 def policy_names() -> tuple[str, ...]:
@@ -36,15 +36,15 @@ def is_shipped(path: Path) -> bool:
 
 
 def group_of(name: str) -> str:
-    """Name without the training seed: what several seeds of one recipe and task share."""
+    """Name without the training seed."""
     return re.sub(r"-seed\d+$", "", name)
 
 
 def best_policy(problem: ProblemLike | None) -> str:
-    """Name of the best shipped policy for a problem, its name or its file.
+    """Name of the best shipped policy for a problem.
 
-    It was chosen when they were shipped, from what they reach of the problem as it ships; another
-    tolerance, horizon, reward or spread of the starts does not change the choice.
+    It was chosen by what policies reach of the shipped problem, whatever tolerance, horizon, reward
+    or spread of the starts this one has.
     """
     if problem is None:
         raise InvalidInputError(f"{BEST!r} is the best policy for a problem: name a --problem")
@@ -68,16 +68,16 @@ def load_policy(name_or_file: str | Path, problem: ProblemLike | None = None) ->
     Parameters
     ----------
     name_or_file : str or Path
-        Name of a shipped policy; name of a group, for its first seed; ``"best"``; or path of a
-        file, or of a folder, for the first policy in it.
+        Name of a shipped policy, or of a group for its first seed; ``"best"``;
+        or path of a file, or of a folder for the first policy in it.
     problem : ReachProblem, str or Path, optional
         What the best one is for.
 
     Raises
     ------
     KinarmError
-        If it is neither a name nor a file, no policy ships for the problem, or the file cannot be
-        used.
+        If it is neither name nor file, no policy ships for the problem, or the
+        file cannot be used.
     """
     return Policy.load(policy_files(name_or_file, problem)[0])
 
@@ -85,7 +85,7 @@ def load_policy(name_or_file: str | Path, problem: ProblemLike | None = None) ->
 def policy_files(name_or_file: str | Path, problem: ProblemLike | None = None) -> tuple[Path, ...]:
     """Files behind a policy's name, a group's name, ``"best"`` or a path; see `load_policy`.
 
-    Those of a folder are in the order of the numbers in their names.
+    In a folder, numbers in their names order them.
     """
     text, path = str(name_or_file), Path(name_or_file)
     if text == BEST:
@@ -110,7 +110,7 @@ def models_in(path: Path) -> list[Path]:
 
 
 def _files_in(folder: Path) -> tuple[Path, ...]:
-    """Policies in a folder, but not the checkpoints of trainings."""
+    """Policies in a folder, without checkpoints."""
     found = [path for path in folder.glob("*.npz") if not path.name.endswith(CHECKPOINT)]
     if not found:
         raise InvalidInputError(f"there is no policy (.npz) in the folder {str(folder)!r}")
@@ -123,10 +123,9 @@ def _in_order(paths: Iterable[Path]) -> list[Path]:
 
 
 def starting_policy(name_or_file: str, widths: Sequence[int]) -> Policy:
-    """Load a policy with which a training can begin, of any arm and problem.
+    """Load a policy to begin a training with, of any arm and problem.
 
-    Its layers must have the widths of the training's, from the observation to the action, and the
-    same functions.
+    Its layers must have the training's widths, from observation to action, and functions.
     """
     policy = load_policy(name_or_file)
     found = (policy.n_observations, *(len(layer.bias) for layer in policy.layers))
@@ -145,5 +144,5 @@ def starting_policy(name_or_file: str, widths: Sequence[int]) -> Policy:
 
 
 def statistics(policy: Policy) -> Normalizer:
-    """Statistics of observations that a policy was trained with, as those of a few of them."""
+    """A policy's statistics, as if of few observations."""
     return Normalizer(SEEN, np.array(policy.mean), SEEN * policy.std**2)

@@ -1,9 +1,9 @@
 """Reflection about the x-z plane, and its effect on observations and actions.
 
-The reflection y -> -y maps the right bench to the left one and an arm that is symmetric about its
-x-z plane to itself, with joints that turn about x or z reversed. In observations and actions it
-only changes signs. A policy with a mirror sees goals on the left reflected, and its actions are
-reflected in turn: it does on one bench exactly what it does on the other.
+The reflection y -> -y swaps the benches, and reverses the joints that turn about x or z of an arm
+that is symmetric about its x-z plane. Observations and actions only change signs. A policy with a
+mirror sees goals on the left reflected, and its actions are reflected in turn: it does the same on
+both benches.
 """
 
 import math
@@ -23,7 +23,7 @@ from kinarm.scene import Obstacle, Point
 from kinarm.world import World
 
 TESTED_CONFIGURATIONS, MIRRORED_CONFIGURATIONS = 16, 2000
-"""At which observations are compared, and contact."""
+"""Where observations are compared, and contact."""
 
 ACCURACY = 1e-9
 
@@ -31,7 +31,7 @@ REFLECTION = (1.0, -1.0, 1.0)
 
 
 def find_mirror(world: World) -> Mirror:
-    """Find the signs for an arm, and check them with its limits and forward kinematics."""
+    """Find the signs for an arm, and check limits and forward kinematics."""
     arm = world.arm
     along_y = np.abs(arm.chain.axis[:, 1]) > 0.5
     axes = np.where(along_y ^ arm.chain.prismatic, 1.0, -1.0)
@@ -47,19 +47,19 @@ def find_mirror(world: World) -> Mirror:
 
 
 def _beyond_limits(axes: Array, lower: Array, upper: Array) -> NDArray[np.bool_]:
-    """Joints whose limits are not their own mirror image, given the signs of the reflection."""
+    """Joints whose limits are not their own mirror image."""
     apart = np.abs(np.sort([axes * lower, axes * upper], axis=0) - [lower, upper])
     uneven: NDArray[np.bool_] = apart.max(axis=0) > ACCURACY
     return uneven
 
 
 def mirror_findings(world: World) -> dict[str, str]:
-    """Reasons against reflecting arm, scene and task about the x-z plane.
+    """Reasons against reflecting arm, scene and task.
 
-    Joints that turn about y, or slide across it, keep their sign; that is looked at where all
-    joints are at zero. Joints that are not actuated stay at home. For ``kinematics``, ``limits``,
-    ``contact``, ``scene`` and ``observations`` (whether the mirror image of an observation differs
-    from it by signs alone), there is a reason, or an empty text where it holds.
+    Joints that turn about y, or slide across it, keep their sign, judged with all joints at zero.
+    Joints that are not actuated stay at home. For ``kinematics``, ``limits``, ``contact``,
+    ``scene`` and ``observations`` (whether their mirror images differ by signs alone), there is a
+    reason, or an empty text.
     """
     arm = world.arm
     axes, moved = _axis_signs(world)[: arm.n_actuated], slice(arm.n_actuated)
@@ -87,7 +87,7 @@ def mirror_findings(world: World) -> dict[str, str]:
 
 
 def _axis_signs(world: World) -> Array:
-    """Signs that the reflection gives to the joints, shape (n_joints,)."""
+    """Signs of the joints in the reflection, shape (n_joints,)."""
     model, chain = world.arm.model, world.arm.chain
     data = model.createData()
     pin.forwardKinematics(model, data, np.zeros(model.nq))
@@ -98,9 +98,9 @@ def _axis_signs(world: World) -> Array:
 
 @lru_cache(maxsize=8)
 def _mirror_and_reason(problem: ReachProblem) -> tuple[Mirror | None, str]:
-    """Reflection of arm and obstacles, and why there is none; the arm is pinned.
+    """Reflection of arm and obstacles, or why there is none; the arm is pinned.
 
-    A training asks several times, and a world takes longer to build than an iteration.
+    A training asks often, and a world takes longer to build than an iteration.
     """
     if not obstacles_are_symmetric(problem):
         return None, "obstacles are not their own mirror image"
@@ -111,17 +111,17 @@ def _mirror_and_reason(problem: ReachProblem) -> tuple[Mirror | None, str]:
 
 
 def problem_mirror(problem: ReachProblem) -> Mirror | None:
-    """Reflection that a policy can commute with, if arm and obstacles have one; goals need not."""
+    """Reflection of arm and obstacles, if they have one; goals need not."""
     return _mirror_and_reason(problem.pinned)[0]
 
 
 def missing_mirror(problem: ReachProblem) -> str:
-    """Why arm and obstacles are not their own mirror image; an empty text if they are."""
+    """Why arm and obstacles are not their own mirror image, or an empty text."""
     return _mirror_and_reason(problem.pinned)[1]
 
 
 def different_regions(problem: ReachProblem, symmetric: bool) -> int:
-    """How many goal regions a policy meets, which sees those on the left in the mirror or not."""
+    """Goal regions that a policy meets, those on the left mirrored if symmetric."""
     regions = (problem.scene.goal_region(name) for name in problem.task.goal_regions)
     boxes = [(region.lower, region.upper) for region in regions]
     if symmetric:
@@ -137,7 +137,7 @@ def obstacles_are_symmetric(problem: ReachProblem) -> bool:
 
 
 def is_symmetric(problem: ReachProblem) -> bool:
-    """Whether the reflection maps obstacles and goals, with their weights, to themselves."""
+    """Whether the reflection maps obstacles, goals and weights to themselves."""
     task, scene = problem.task, problem.scene
     weights = task.goal_weights or (1.0,) * len(task.goal_regions)
     regions = [scene.goal_region(name) for name in task.goal_regions]
@@ -147,7 +147,7 @@ def is_symmetric(problem: ReachProblem) -> bool:
 
 
 def _turned(box: Obstacle, yaw: float) -> float:
-    """The smallest angle at which a box looks as at another one, rounded [rad]."""
+    """The smallest angle at which a box looks the same, rounded [rad]."""
     square = abs(box.size[0] - box.size[1]) < ACCURACY
     turn = math.pi / 2 if square else math.pi
     return round(yaw % turn, 9) % round(turn, 9)

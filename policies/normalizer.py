@@ -8,11 +8,11 @@ from numpy.typing import NDArray
 from kinarm.errors import InvalidInputError
 
 CONSTANT_BELOW = 1e-6
-"""An input whose standard deviation is smaller counts as constant and gets weight zero."""
+"""Inputs with a smaller standard deviation are constant and get weight zero."""
 
 
 def input_scale(std: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Factors that normalise inputs: 1 / std, and 0 for constant ones."""
+    """Factors that normalise inputs: 1 / std, or 0 for constant ones."""
     constant = std < CONSTANT_BELOW
     return np.where(constant, 0.0, 1.0 / np.where(constant, 1.0, std))
 
@@ -23,16 +23,16 @@ def fold_normalizer(
     mean: NDArray[np.float64],
     std: NDArray[np.float64],
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Make affine layers that take observations as they are of ones that take normalised ones.
+    """Make affine layers that take raw instead of normalised observations.
 
-    The sums are taken in a fixed order, not by BLAS, whose order depends on the processor.
+    Sums have a fixed order, unlike those of BLAS.
 
     Parameters
     ----------
     weights, bias : ndarray, shape (..., n_out, n_observations) and (..., n_out)
-        Of layers that take observations normalised.
+        Of layers that take normalised observations.
     mean, std : ndarray, shape (n_observations,)
-        Statistics by which they are normalised.
+        Statistics that normalise them.
     """
     scaled = weights * input_scale(std)
     return scaled, bias - (scaled * mean).sum(axis=-1)
@@ -62,7 +62,7 @@ class Normalizer:
 
     @classmethod
     def empty(cls, n_observations: int) -> "Normalizer":
-        """Statistics before the first observation: mean 0 and standard deviation 1."""
+        """Statistics of no observation: mean 0 and standard deviation 1."""
         return cls(0, np.zeros(n_observations), np.zeros(n_observations))
 
     @classmethod
@@ -73,7 +73,7 @@ class Normalizer:
 
     @property
     def std(self) -> NDArray[np.float64]:
-        """Population standard deviation, shape (n_observations,); 1 before any observation."""
+        """Population standard deviation, shape (n_observations,); 1 at first."""
         if self.count == 0:
             return np.ones_like(self.mean)
         return np.sqrt(self.squares / self.count)
@@ -84,8 +84,8 @@ class Normalizer:
         Parameters
         ----------
         moments, counts : ndarray, shape (n, 2, n_observations) and (n,)
-            Per episode, the sums of the observations less `mean` and of the squares of these, and
-            the number of observations.
+            Per episode, sums of the observations less `mean` and of their
+            squares, and number of observations.
         """
         added = int(counts.sum())
         if added == 0:

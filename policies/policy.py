@@ -1,4 +1,4 @@
-"""One class for every trained policy: a normaliser, dense layers and a clip; and its file."""
+"""The class of all trained policies, and its file."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -23,14 +23,15 @@ from kinarm.problem import ProblemLike, ReachProblem
 FORMAT_VERSION = 3
 
 LARGEST = 1e30
-"""Magnitude of statistics and weights at most: with larger ones, actions overflow."""
+"""Largest magnitude of statistics and weights: beyond it, actions overflow."""
 
 
 @dataclass(frozen=True, eq=False)
 class Policy:
     """Maps observations to actions: normalise, dense layers, clip to [-1, 1].
 
-    A linear policy has one layer. Inputs that were constant in training have weight zero.
+    A linear policy has one layer. Inputs that were constant in training have
+    weight zero.
 
     Parameters
     ----------
@@ -39,11 +40,11 @@ class Policy:
     layers : tuple of Layer
         From the observation to the action.
     provenance : Provenance
-        Where it comes from, and the problem that it was made for.
+        Where it comes from, and its problem.
     activations : tuple of str
-        Function after each layer, the last one before the clip: ``"linear"``, ``"tanh"``,
-        ``"relu"``, ``"hardtanh"``, ``"elu"``, ``"leaky_relu"`` or ``"silu"``; by default tanh
-        between the layers and none after the last.
+        Function after each layer, the last one before the clip: ``"linear"``,
+        ``"tanh"``, ``"relu"``, ``"hardtanh"``, ``"elu"``, ``"leaky_relu"`` or
+        ``"silu"``; by default tanh between the layers and none after the last.
     mirror : Mirror, optional
         Reflection in which it sees goals on the left, and acts.
     """
@@ -108,7 +109,7 @@ class Policy:
     def __call__(self, observations: ArrayLike) -> NDArray[np.float64]:
         """Choose actions: fractions of the velocity limits in [-1, 1], shape ([n,] n_actions).
 
-        One observation, or several, of the shape ([n,] n_observations).
+        Observations have the shape ([n,] n_observations).
         """
         given = np.asarray(observations, dtype=float)
         shape = (self.n_observations,) if given.ndim == 1 else (None, self.n_observations)
@@ -136,17 +137,17 @@ class Policy:
         Parameters
         ----------
         observation : array_like or mapping
-            One observation or several, as for a call; or, of the goal-conditioned environments,
-            a dictionary of ``observation``, ``achieved_goal`` and ``desired_goal``.
+            One observation or several, as for a call; or a dictionary of
+            ``observation``, ``achieved_goal`` and ``desired_goal``.
         state, episode_start, deterministic
-            Of no effect: policies neither remember nor draw. The state is given back as it is.
+            Of no effect; the state is returned as it is.
         """
         if isinstance(observation, Mapping):
             observation = flat_observation(observation, self.n_observations)
         return self(observation), state
 
     def networks(self) -> Networks:
-        """The policy in the form that the compiled simulator runs, normaliser folded in."""
+        """The policy as the simulator runs it, normaliser folded in."""
         return self._networks
 
     @cached_property
@@ -164,28 +165,31 @@ class Policy:
     ) -> "Policy":
         """Convert a model of Stable-Baselines3 or sb3-contrib: its deterministic actions.
 
-        The model computes in float32, the policy with the same numbers in float64; their actions
-        agree to about 1e-6.
+        The model computes in float32, the policy in float64; actions agree to
+        about 1e-6.
 
         Parameters
         ----------
         model : BaseAlgorithm, str or Path
-            PPO, A2C, SAC, TD3, DDPG or TQC with ``MlpPolicy`` or ``MultiInputPolicy``, or the file
-            that its ``save`` wrote. Loading a file runs code in it: open only files that you
-            trust.
+            PPO, A2C, SAC, TD3, DDPG or TQC with ``MlpPolicy`` or
+            ``MultiInputPolicy``, or its file. Loading runs code in the file:
+            open only files that you trust.
         problem : ReachProblem, str or Path, optional
-            The problem that the policy is for; by default that of the model's environment.
+            The problem of the policy; by default that of the model's
+            environment.
         vec_normalize : VecNormalize, str or Path, optional
-            The statistics that normalise its observations, their file, which runs code, or
-            ``"none"``. By default those of the model's environment, and for a file those that bear
-            its name; a model that was trained with others is refused.
+            The statistics that normalise its observations, their file, which
+            runs code, or ``"none"``. By default those of the model's
+            environment, and for a file those that bear its name; a model that
+            was trained with others is refused.
 
         Raises
         ------
         KinarmError
-            If it cannot be converted, with the reason: it is recurrent, computes features, has
-            other activation functions, or other observations or actions than the arm; the problem
-            is unknown; a file cannot be read; or Stable-Baselines3 is not installed.
+            If the model is recurrent, computes features, has other activation
+            functions, or other observations or actions than the arm; the
+            problem is unknown; a file cannot be read; or Stable-Baselines3 is
+            not installed.
         """
         from kinarm.policies.conversion.sb3 import policy_from_sb3
 
@@ -203,20 +207,21 @@ class Policy:
         environment_steps: int = 0,
         seed: int | None = None,
     ) -> "Policy":
-        """Convert a feed-forward network of PyTorch, which maps observations to actions.
+        """Convert a feed-forward network of PyTorch.
 
         Parameters
         ----------
         module : nn.Module
-            A ``Sequential`` of ``Linear`` and activation functions; it can be nested.
+            A ``Sequential`` of ``Linear`` and activation functions, maybe
+            nested.
         problem : ReachProblem, str or Path
             The problem that it is for.
         mean, std : array_like, shape (n_observations,), optional
-            Statistics by which its inputs are normalised; without them they are not.
+            Statistics that normalise its inputs, if any.
         name : str
-            Name of the algorithm that trained it, for tables.
+            Name of its algorithm, for tables.
         environment_steps, seed
-            Steps and seed of the training, for the record.
+            Steps and seed of its training.
         """
         from kinarm.policies.conversion.layers import module_pieces, policy_of_pieces
 
@@ -225,7 +230,7 @@ class Policy:
         return policy_of_pieces(cls, pieces, own, mean, std, recipe="torch", **origin)
 
     def check_arm(self, arm: Arm) -> None:
-        """Refuse an arm that differs from its own in anything that the simulator uses."""
+        """Refuse an arm that the simulator treats otherwise than its own."""
         trained = self.problem.arm
         if self.problem.arm_digest != arm.digest:
             other = "another version of arm" if trained.name == arm.name else "arm"
@@ -234,9 +239,9 @@ class Policy:
             )
 
     def save(self, path: str | Path) -> None:
-        """Write the policy to an ``.npz`` file, without pickle; all of it or nothing."""
+        """Write an ``.npz`` file without pickle, all of it or nothing."""
         content = policy_content(self)
-        # Weights of networks have the digits of single precision: compressed, they take half.
+        # Weights of networks are of single precision: compressed, they take half.
         save_archive(path, "policy", FORMAT_VERSION, content.arrays, content.header, compress=True)
 
     @classmethod
@@ -246,8 +251,8 @@ class Policy:
         Raises
         ------
         PolicyFileError
-            If the file is missing, truncated, not a policy, written by another version, or made
-            for observations of another layout.
+            If the file is missing, truncated, not a policy, or of another
+            version or layout of observations.
         """
         content = load_archive(path, "policy", FORMAT_VERSION, PolicyFileError)
         with reading(repr(str(path)), "policy", PolicyFileError):
@@ -255,13 +260,13 @@ class Policy:
 
 
 def layer_widths(problem: ReachProblem, hidden: Sequence[int] = ()) -> tuple[int, ...]:
-    """Widths of a policy's layers for a problem, from the observation to the action."""
+    """Widths of a policy's layers, from the observation to the action."""
     arm = problem.load_arm()
     return (observation_size(arm.n_joints), *hidden, arm.n_actuated)
 
 
 def policy_content(policy: Policy) -> Archive:
-    """A policy as files hold it: `policy_of_content` makes it again."""
+    """A policy as files hold it, for `policy_of_content`."""
     header = {
         "provenance": policy.provenance.to_json(),
         "observation": observation_layout(),
@@ -276,9 +281,9 @@ def policy_content(policy: Policy) -> Archive:
 
 
 def policy_of_content(content: Archive, where: str) -> Policy:
-    """Rebuild what `policy_content` returned and the file ``where`` holds.
+    """Rebuild what `policy_content` returned, read from ``where``.
 
-    Errors are those of what is missing, or cannot be used: for `kinarm._files.reading`.
+    Call it within `kinarm._files.reading`, which turns errors into messages.
     """
     header, arrays = content
     if header["observation"] != observation_layout():
@@ -304,10 +309,10 @@ GOAL_KEYS = ("observation", "achieved_goal", "desired_goal")
 
 
 def flat_observation(given: Mapping[str, ArrayLike], n_observations: int) -> NDArray[np.float64]:
-    """Put a dictionary observation, of one arm or of several, together as policies take it.
+    """Make a flat observation of a dictionary observation.
 
-    It has an ``observation`` of shape (..., n_own), ``achieved_goal`` and ``desired_goal`` of shape
-    (..., 3) [m]; anything else is refused. The flat one has the shape (..., n_observations).
+    It holds just ``observation``, shape (..., n_own), ``achieved_goal`` and ``desired_goal``, shape
+    (..., 3) [m]. The flat one has the shape (..., n_observations).
     """
     if set(given) != set(GOAL_KEYS):
         raise InvalidInputError(

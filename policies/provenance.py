@@ -28,22 +28,22 @@ class Provenance:
     Parameters
     ----------
     algorithm, recipe : str
-        Such as ``"ars"``, and the name of the settings that it was trained with.
+        Such as ``"ars"``, and the name of its settings.
     problem : ReachProblem
-        The problem that it is for, with the hash of its arm.
+        Its problem, with the hash of the arm.
     seed : int, optional
-        Seed of the training, if it had one.
+        Seed of the training, if any.
     environment_steps : int
         Steps that the training took.
     config : dict
-        All settings of the learner, but for the problem.
+        Settings of the learner, without the problem.
     versions : dict
         Versions of the packages that matter.
     commit : str
-        Commit of kinarm's source, with ``-dirty`` if it was changed; empty if unknown.
+        Commit of kinarm's source, with ``-dirty`` if changed; empty if unknown.
     semantics : str, optional
-        Version of what kinarm computes (`kinarm.SEMANTICS`) with which it was trained; unknown in
-        older files and for policies that were trained elsewhere.
+        Version of what kinarm computes (`kinarm.SEMANTICS`) in its training;
+        unknown in older files and for policies trained elsewhere.
     """
 
     algorithm: str
@@ -58,12 +58,12 @@ class Provenance:
 
     @classmethod
     def of(cls, algorithm: str, config: TrainingConfig, environment_steps: int) -> "Provenance":
-        """Record a training that took place here and now.
+        """Record a training here and now.
 
         Parameters
         ----------
         algorithm, config, environment_steps
-            Name of the learner, its settings, and the steps that it took.
+            Name of the learner, its settings, and steps taken.
         """
         return cls(
             algorithm=algorithm,
@@ -79,17 +79,16 @@ class Provenance:
 
     def to_json(self) -> dict[str, Any]:
         """As a dictionary that JSON can hold."""
-        entries: dict[str, Any] = to_plain(self)
-        return entries
+        return dict(to_plain(self))
 
     @classmethod
     def from_json(cls, entries: Mapping[str, Any]) -> "Provenance":
-        """Rebuild what `to_json` returned; entries that are missing or unknown are refused."""
+        """Rebuild what `to_json` returned; missing or unknown entries are refused."""
         return from_plain(cls, entries, "provenance")
 
 
 def plain_settings(config: TrainingConfig) -> dict[str, Any]:
-    """All settings of a learner, but for the problem, as JSON can hold them."""
+    """Settings of a learner without the problem, for JSON."""
     return {name: value for name, value in to_plain(config).items() if name != "problem"}
 
 
@@ -111,7 +110,7 @@ def normalization_note(name: str, config: Mapping[str, Any]) -> str:
 
 @cache
 def package_versions() -> dict[str, str]:
-    """Versions of Python and of the packages that results depend on, looked up once."""
+    """Versions of Python and of packages that results depend on."""
     versions = {"python": platform.python_version()}
     for package in RECORDED_PACKAGES:
         with suppress(metadata.PackageNotFoundError):
@@ -121,7 +120,7 @@ def package_versions() -> dict[str, str]:
 
 @cache
 def source_commit() -> str:
-    """Commit of the clone that this runs from, or an empty string outside of a clone."""
+    """Commit of the clone that this runs from, or an empty string."""
     root = Path(__file__).resolve().parent.parent
     command = ["git", "-C", str(root), "describe", "--always", "--dirty", "--abbrev=12"]
     with suppress(OSError, subprocess.SubprocessError):

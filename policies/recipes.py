@@ -1,4 +1,4 @@
-"""Recipes: settings by name, or from a file; those that ship with kinarm, and their adaption."""
+"""Recipes: settings by name or from a file, adapted to problems."""
 
 from collections.abc import Mapping
 from dataclasses import replace
@@ -13,27 +13,27 @@ from kinarm.policies.learners import Learner, find_learner
 from kinarm.problem import PROBLEMS, ReachProblem
 
 PER_TRAINING = ("problem", "seed")
-"""Settings that vary from one training with a recipe to the next."""
+"""Settings that vary between trainings with a recipe."""
 
 RECIPE_REACH = 1.264
-"""Reach of the arm ``paper``, in which the lengths of recipes were found [m]."""
+"""Reach of the arm ``paper``, for which recipes were found [m]."""
 
 
 def recipe(learner: str, name_or_file: str | Path | None = None, **changes: Any) -> Any:
-    """Look settings up, adapt them to the problem and replace some of them.
+    """Look settings up, adapt them to the problem and replace some.
 
     Parameters
     ----------
     learner : str
         Name of the learner, or ``module:LEARNER``.
     name_or_file : str or Path, optional
-        Name of a recipe, or a TOML file with some of the learner's settings; the others are those
-        of the recipe that its entry ``base`` names. Where none is named it is the learner's first:
-        that of the paper for ARS and PPO.
+        Name of a recipe, or a TOML file with some settings; the others are
+        those of the recipe that its entry ``base`` names. The default is the
+        learner's first one: that of the paper for ARS and PPO.
     **changes
-        Fields of the learner's settings to replace; None leaves a field as it is. A mapping
-        replaces the entries that it names, such as weights of the ``reward``. If another field
-        than problem and seed changes, the recipe's name in the result gets a star.
+        Fields to replace; None leaves a field as it is, a mapping replaces the
+        entries that it names. If another field than problem and seed changes,
+        the recipe's name gets a star.
 
     Returns
     -------
@@ -91,15 +91,15 @@ def _read_recipe(learner: Learner[Any, Any], path: Path, circumstances: Mapping[
 def shipped_learner(name: str, config: type[ConfigT], **parts: Any) -> Learner[ConfigT, Any]:
     """A learner of kinarm, with the recipes of its file in ``data/recipes``.
 
-    A recipe has a ``summary``, the settings that it replaces of its ``base``, and maybe those that
-    are others ``where_regions_differ``; see `adapted`.
+    A recipe has a ``summary``, settings that replace those of its ``base``, and
+    maybe others ``where_regions_differ``; see `adapted`.
 
     Parameters
     ----------
     name, config
         Name of the learner, and its settings.
     **parts
-        What else a `Learner` has.
+        Other fields of `Learner`.
     """
     path, summaries, recipes, apart = shipped_files("recipes")[name], {}, {}, {}
     tables = read_toml(path, "recipe")
@@ -122,16 +122,16 @@ def shipped_learner(name: str, config: type[ConfigT], **parts: Any) -> Learner[C
 def adapted(config: ConfigT, apart: Mapping[str, ConfigT]) -> ConfigT:
     """Adapt a recipe to its problem, if it is symmetric.
 
-    Progress is rewarded in proportion to the arm's reach, and tolerances of the training are shares
-    of the task's.
+    Progress is rewarded in proportion to the arm's reach, and training
+    tolerances are shares of the task's.
 
     Parameters
     ----------
     config : TrainingConfig
         The recipe, with problem and seed.
     apart : mapping of str to TrainingConfig
-        What takes its place where several regions are to be reached and no reflection maps one to
-        another.
+        What replaces it where several regions are to be reached that no
+        reflection joins.
     """
     if not getattr(config, "symmetric", False):
         return config

@@ -1,6 +1,6 @@
-"""A training from what is asked for to the files that it leaves.
+"""A training, from the request to the files that it leaves.
 
-A policy, its learning curve and, while the training lasts, a checkpoint lie beside each other.
+Policy, learning curve and, until the end, checkpoint lie side by side.
 """
 
 import csv
@@ -39,7 +39,7 @@ STARTING = "starting"
 
 
 def checkpoint_path(out: str | Path) -> Path:
-    """Where the checkpoint of a training lies until it is finished."""
+    """Where the checkpoint of an unfinished training lies."""
     return Path(out).with_suffix(CHECKPOINT)
 
 
@@ -66,18 +66,20 @@ class TrainRequest(ProblemOptions):
     learner : str
         Name of the learner.
     recipe : str, optional
-        Named settings, or a TOML file with some.
+        Name of settings, or a TOML file with some.
     seed : int, optional
         Seed of all randomness.
     settings : mapping
         Settings of the learner that replace those of the recipe.
     out : Path
-        File of the policy; learning curve and checkpoint lie beside it; with --seeds, folder of
-        the policies.
+        File of the policy, with learning curve and checkpoint beside it; with
+        --seeds, folder of the policies.
     resume : bool
-        Go on from the checkpoint beside --out; with --seeds, with each seed that is not finished.
+        Go on from the checkpoint beside --out; with --seeds, with each
+        unfinished seed.
     overwrite : bool
-        Replace an earlier policy; with --resume, by that of the training that goes on.
+        Replace an earlier policy; with --resume, by that of the training that
+        goes on.
     tensorboard : Path, optional
         Folder for TensorBoard logs.
     """
@@ -106,8 +108,8 @@ class TrainRequest(ProblemOptions):
     def run(self) -> TrainingResult:
         """Train, and write the policy and its learning curve.
 
-        While the training lasts, a checkpoint beside the policy is renewed every few seconds. It is
-        complete after an interruption, too, and the message of `KeyboardInterrupt` says so.
+        A checkpoint beside the policy is renewed every few seconds, and complete after an
+        interruption.
         """
         if self.resume:
             config, state = self._checkpoint()
@@ -124,7 +126,7 @@ class TrainRequest(ProblemOptions):
             return self._train(config, state)
 
     def _train(self, config: TrainingConfig, state: Any) -> TrainingResult:
-        """Train from a state on, None for the beginning, and write the files."""
+        """Train from a state, None for the first, and write the files."""
         options = {} if self.tensorboard is None else {"tensorboard": self.tensorboard}
         path, name = checkpoint_path(self.out), find_learner(config.learner).name
         title = f"{name} {config.recipe} {config.problem.name} seed {config.seed}"
@@ -160,7 +162,7 @@ class TrainRequest(ProblemOptions):
         return result
 
     def config(self) -> TrainingConfig:
-        """Settings of the training: those of the recipe, with the replacements of the fields."""
+        """Settings of the training: the recipe's, with replacements."""
         problem = self.resolve(default=recipe(self.learner, self.recipe).problem)
         config: TrainingConfig = recipe(
             self.learner, self.recipe, problem=problem, seed=self.seed, **self.settings
@@ -168,7 +170,7 @@ class TrainRequest(ProblemOptions):
         return config
 
     def _checkpoint(self) -> Checkpoint:
-        """The training to go on with, which must be the one that is asked for."""
+        """The training to go on with, which must be the one requested."""
         path = checkpoint_path(self.out)
         if not path.exists():
             raise PolicyFileError(f"nothing to resume: there is no {str(path)!r}")
@@ -191,10 +193,10 @@ class TrainRequest(ProblemOptions):
 
 
 def say_findings(config: TrainingConfig) -> None:
-    """Say on standard error what was chosen for the arm, and what hinders the training.
+    """Say on standard error what was chosen, and what hinders the training.
 
-    That is many goals out of reach, but of the paper's problems, which are known; or that
-    ``symmetric`` has no effect: a user set it then.
+    The latter is many goals out of reach, but in the paper's problems, or a ``symmetric`` without
+    effect.
     """
     from kinarm.clearance import reach_warning
     from kinarm.policies.mirror import missing_mirror

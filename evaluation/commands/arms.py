@@ -1,4 +1,4 @@
-"""``kinarm-arms``: the arms that kinarm knows, and a description of one."""
+"""``kinarm-arms``: list arms, and describe one."""
 
 import sys
 from contextlib import suppress
@@ -17,7 +17,7 @@ HEADINGS = (
     *("licence", "source", "installed"),
 )
 EXPENDABLE = ("source", "licence", "speeds [deg/s]", "pairs", "actuated", "joints", "title")
-"""Columns that a narrow terminal does without, the first ones first."""
+"""Columns that narrow terminals leave out, in this order."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -25,7 +25,7 @@ class ListRequest:
     """List the arms that kinarm knows."""
 
     def rows(self) -> list[tuple[str, ...]]:
-        """A row for each arm, under `HEADINGS`; of those not installed, what their file says."""
+        """A row for each arm, under `HEADINGS`; partly empty if not installed."""
         from kinarm.arm import Arm
         from kinarm.errors import ArmError
         from kinarm.evaluation.arm_facts import contact_on_bare_ground, joint_speeds

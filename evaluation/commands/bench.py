@@ -44,9 +44,9 @@ class BenchmarkRequest(Checked):
     DEFAULTS: ClassVar = {"out": "a table on standard output alone"}
 
     def run(self, command: str | None = None) -> dict[str, Any]:
-        """Measure everything, and write ``speed.json`` and ``SPEED.md`` if there is a folder.
+        """Measure everything, and write ``speed.json`` and ``SPEED.md`` to a folder, if any.
 
-        ``command`` is recorded as what made the files; else it is this request.
+        ``command`` is recorded, by default this request.
         """
         from kinarm.evaluation.bench import measure
 

@@ -1,4 +1,4 @@
-"""``kinarm-eval``: evaluate policies on random reaching trials, beside an oracle."""
+"""``kinarm-eval``: evaluate policies on random trials, beside an oracle."""
 
 import json
 from functools import partial
@@ -37,21 +37,18 @@ def _report(request: EvaluationRequest, command: str) -> None:
 
 
 def _footnote(document: "EvaluationDocument") -> str:
-    """Notes on what the figures in the table are of."""
+    """Notes on the figures in the table."""
     from kinarm.evaluation.report.templating import template_environment
     from kinarm.evaluation.table import REPLACED, has_star, table_rows
 
     protocol = document.protocol
     rows = (row for name in protocol.problems for row in table_rows(document, name))
-    text = (
-        template_environment()
-        .get_template("footnote.txt")
-        .render(
-            protocol=protocol,
-            results=document.results,
-            starred=any(map(has_star, rows)),
-            replaced=REPLACED,
-        )
+    template = template_environment().get_template("footnote.txt")
+    text = template.render(
+        protocol=protocol,
+        results=document.results,
+        starred=any(map(has_star, rows)),
+        replaced=REPLACED,
     )
     return text.rstrip()
 

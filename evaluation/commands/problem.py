@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 HEADINGS = ("problem", "arm", "obstacles", "goals", "step [s]", "tolerance [m]")
 EXPENDABLE = ("obstacles", "step [s]", "tolerance [m]")
-"""Columns that a narrow terminal does without, the first ones first."""
+"""Columns that narrow terminals leave out, in this order."""
 
 PICTURE_SIZE = 960, 640
 
@@ -101,7 +101,7 @@ class CheckRequest(ShowRequest):
 
 
 def write_picture(path: Path, problem: ReachProblem) -> None:
-    """Write a picture of the arm at home, and a goal in the middle of a region."""
+    """Write a picture of the arm at home, with a goal in mid-region."""
     from matplotlib.image import imsave
 
     from kinarm.viewer import Renderer
@@ -114,7 +114,7 @@ def write_picture(path: Path, problem: ReachProblem) -> None:
 
 
 def rows() -> list[tuple[str, ...]]:
-    """A row for each problem that ships, under `HEADINGS`."""
+    """A row for each shipped problem, under `HEADINGS`."""
     return [
         (
             problem.name,

@@ -1,4 +1,4 @@
-"""``kinarm-reproduce``: train what the paper trained, and see which of its claims hold."""
+"""``kinarm-reproduce``: train what the paper trained, and judge its claims."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
@@ -27,7 +27,8 @@ class ReproductionRequest(RunningOptions):
     out : Path
         Output folder.
     quick : bool
-        Make a smoke run: every step with trainings of a few iterations, and no verdicts.
+        Make a smoke run: every step with trainings of a few iterations, and no
+        verdicts.
     ppo : bool
         Train with PPO as well, and judge the claims that compare it with ARS.
     """
@@ -59,15 +60,15 @@ class ReproductionRequest(RunningOptions):
     def run(
         self, executor: "Executor | None" = None, command: str | None = None
     ) -> "Sequence[Claim]":
-        """Run the missing trainings, write the results, and return the claims, read literally.
+        """Run the missing trainings, write the results, and return the claims read literally.
 
-        ``executor`` says where trainings are carried out, instead of the options, and ``command``
-        what is recorded as having made the files, instead of this request.
+        ``executor`` replaces the options about where trainings run; ``command``
+        is recorded, by default this request.
 
         Raises
         ------
         KeyboardInterrupt
-            If it is interrupted; what is finished is kept, and the message says so.
+            If it is interrupted; what is finished is kept.
         """
         from kinarm.evaluation.experiments.study import Study
         from kinarm.evaluation.paper.page import write_all

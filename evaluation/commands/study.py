@@ -71,7 +71,7 @@ class RunningOptions(Checked):
                 raise InvalidInputError(f"--{name} goes with --slurm")
 
     def executor(self, folder: Path, threads: int = 1) -> "Executor":
-        """Where trainings run: on so many threads each, with Slurm's jobs in the output folder."""
+        """Where trainings run; Slurm's jobs lie in the folder."""
         from kinarm.evaluation.experiments.clusters import RayExecutor, SlurmExecutor
         from kinarm.evaluation.experiments.executors import LocalExecutor
 
@@ -139,15 +139,15 @@ class StudyRequest(RunningOptions):
     def run(self, executor: "Executor | None" = None, command: str | None = None) -> "Study":
         """Run the missing trainings, and write the results.
 
-        ``executor`` says where trainings are carried out, instead of the options, and ``command``
-        what is recorded as having made the files, instead of this request.
+        ``executor`` replaces the options about where trainings run; ``command``
+        is recorded, by default this request.
 
         Raises
         ------
         TrainingFailedError
-            If trainings failed; what the others came to is written.
+            If trainings failed; the results of the others are written.
         KeyboardInterrupt
-            If it is interrupted; what is finished is kept, and the message says so.
+            If it is interrupted; what is finished is kept.
         """
         from kinarm.evaluation.experiments.experiment import Experiment
         from kinarm.evaluation.experiments.page import write_all

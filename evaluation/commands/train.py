@@ -23,10 +23,9 @@ if TYPE_CHECKING:
 PROG = "kinarm-train"
 
 CIRCUMSTANCES = ("problem", "seed", "recipe", "algorithm")
-"""Settings that a `TrainRequest` has fields of its own for, or that the learner determines."""
+"""Settings with a field of `TrainRequest`, or determined by the learner."""
 
 SETTINGS = "settings of the learner (defaults of the recipe {})"
-
 
 MOST_SEEDS = 1000
 
@@ -52,10 +51,11 @@ class SeedsRequest(Checked):
     Parameters
     ----------
     training : TrainRequest
-        What is trained; ``out`` is the folder of the policies, and there is no ``seed``.
+        What is trained; ``out`` is the folder of the policies, and there is no
+        ``seed``.
     seeds : tuple of int
-        Train several seeds in parallel: a number (5 is 0 to 4) or a range (5-9). One policy for
-        each goes into the folder --out.
+        Train several seeds in parallel: a number (5 is 0 to 4) or a range
+        (5-9). One policy for each goes into the folder --out.
     jobs : int, optional
         Seeds at a time.
     """
@@ -80,17 +80,17 @@ class SeedsRequest(Checked):
     def run(self) -> "tuple[TrainedSeed, ...]":
         """Train, and write a policy and a learning curve for each seed.
 
-        Names are those of the shipped policies, such as ``ars-tuned-both-seed0.npz``. With
-        ``resume``, finished seeds are left as they are, and the others go on or begin. What is
-        under way lies in the folder ``.training`` meanwhile.
+        Files are named as ``ars-tuned-both-seed0.npz``. With ``resume``,
+        finished seeds are left as they are, and the others go on or begin.
+        Unfinished ones lie in the folder ``.training``.
 
         Raises
         ------
         TrainingFailedError
-            If trainings failed; all others are finished then.
+            If trainings failed; all others are finished.
         KinarmError
-            If settings cannot be used, a file cannot be written, or workers end unexpectedly again
-            and again.
+            If settings cannot be used, a file cannot be written, or workers end
+            unexpectedly.
         KeyboardInterrupt
             If it is interrupted; the message says how to go on.
         """
@@ -100,7 +100,7 @@ class SeedsRequest(Checked):
 
 
 def build_parser(named: str | None = None) -> Parser:
-    """The options of the command, of all learners or of the one that is named."""
+    """The options of the command, of all learners or of one."""
     parser = Parser(prog=PROG, description="Train a policy.")
     learners = parser.add_commands("learner")
     for name in learner_names() if named is None else (named,):
@@ -111,7 +111,7 @@ def build_parser(named: str | None = None) -> Parser:
 def _add_learner(
     parsers: "argparse._SubParsersAction[CommandParser]", name: str, learner: Learner[Any, Any]
 ) -> None:
-    """Options of a learner: those of every training, and one for each of its settings."""
+    """Add the options of every training, and those of a learner's settings."""
     needs = f"\nneeds the extra {learner.extra}: pip install 'kinarm[{learner.extra}]'\n"
     parser = parsers.add_parser(
         name,
@@ -128,18 +128,15 @@ def _add_learner(
 
 
 def _epilog(name: str, learner: Learner[Any, Any]) -> str:
-    """Recipes of a learner, and examples with the one to try first."""
+    """Recipes of a learner, and examples."""
     recipe = "tuned" if "tuned" in learner.recipes else learner.first_recipe
     lines = (f"  {each:<8} {summary}\n" for each, summary in learner.summaries.items())
-    return (
-        shipped_files("help", ".txt")["learner"]
-        .read_text()
-        .format(
-            name=name,
-            recipes="recipes:\n" + "".join(lines) if learner.summaries else "",
-            recipe=recipe,
-            half=learner.recipes[recipe].iterations // 2,
-        )
+    text = shipped_files("help", ".txt")["learner"].read_text()
+    return text.format(
+        name=name,
+        recipes="recipes:\n" + "".join(lines) if learner.summaries else "",
+        recipe=recipe,
+        half=learner.recipes[recipe].iterations // 2,
     )
 
 
@@ -151,7 +148,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
 
 
 def _train(options: argparse.Namespace) -> None:
-    """Train as the options say, and say how good the policies are and what to type next."""
+    """Train as the options say, and print how good the policies are."""
     given = given_options(options, find_learner(options.learner).config)
     settings = {name: value for name, value in given.items() if name not in CIRCUMSTANCES}
     request = TrainRequest(**given_options(options, TrainRequest), settings=settings)

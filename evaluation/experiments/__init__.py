@@ -1,1 +1,1 @@
-"""Studies: many trainings from one file, each of them judged beside what could be reached."""
+"""Studies: many trainings from one file, beside what could be reached."""

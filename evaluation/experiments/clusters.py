@@ -1,4 +1,4 @@
-"""Executors that carry tasks out on a cluster: Ray, and array jobs of Slurm."""
+"""Executors of a cluster: Ray, and array jobs of Slurm."""
 
 import hashlib
 import os
@@ -22,12 +22,12 @@ from kinarm.policies.oracle import ORACLE_SEMANTICS
 from kinarm.policies.provenance import package_versions
 
 PACKAGES = ("kinarm", "kinarm.policies", "kinarm.evaluation", "kinarm.data")
-"""All of kinarm; in a clone they lie beside each other, else the others lie in the first."""
+"""All of kinarm; in a clone beside each other, else in the first."""
 
 
 @cache
 def identity() -> dict[str, str]:
-    """Versions of packages and of results, and the hash of kinarm's source, by name."""
+    """Versions of packages and of results, and the hash of kinarm's source."""
     files = {
         f"{package}.{'.'.join(path.relative_to(folder).parts)}": path
         for package in PACKAGES
@@ -40,14 +40,14 @@ def identity() -> dict[str, str]:
 
 
 def do_alike(work: Callable[[Any], Any], expected: Mapping[str, str], task: Any) -> Any:
-    """Do the work for a task where kinarm and its packages are those of the driver.
+    """Do the work for a task if all versions are those of the driver.
 
     Parameters
     ----------
     work, expected : callable and mapping
         The work, and the driver's `identity`.
     task : object
-        What the work is done for.
+        The task.
 
     Raises
     ------
@@ -64,27 +64,27 @@ def do_alike(work: Callable[[Any], Any], expected: Mapping[str, str], task: Any)
 
 
 ANSWER_SECONDS = 10.0
-"""How long a cluster may take to answer."""
+"""How long a cluster may take to answer [s]."""
 
 RETRIES = 20
-"""How often a task is begun anew whose worker or node was lost."""
+"""How often a task is begun anew after its worker was lost."""
 
 AT_ONCE = 10_000
-"""Tasks that wait at a Ray cluster at most."""
+"""Most tasks that wait at a Ray cluster."""
 
 
 @dataclass(frozen=True)
 class RayExecutor:
-    """Processors of a Ray cluster; results are sent back, no disk need be shared.
+    """Processors of a Ray cluster; no disk need be shared.
 
     Parameters
     ----------
     address : str
-        ``"local"`` for Ray on this machine alone, ``"auto"`` for the cluster in ``RAY_ADDRESS`` or
-        else the one that this machine is part of, or the address of one, such as
+        ``"local"`` for this machine alone, ``"auto"`` for the cluster in
+        ``RAY_ADDRESS`` or else that of this machine, or an address such as
         ``"10.0.0.1:6379"`` or ``"ray://head:10001"``.
     jobs : int, optional
-        Processors of this machine for ``"local"``; all by default. A cluster has its own.
+        Processors of this machine for ``"local"``; all by default.
     threads : int
         Processors that a task takes.
     """
@@ -146,29 +146,30 @@ class RayExecutor:
 
 
 LOOK_SECONDS = 0.5
-"""How often the driver looks for jobs that ended."""
+"""How often the driver looks for jobs that ended [s]."""
 
 
 @dataclass(frozen=True)
 class SlurmExecutor:
-    """Array jobs of a Slurm cluster, whose machines share the folder with this one.
+    """Array jobs of a Slurm cluster, which shares the folder with this machine.
 
     Parameters
     ----------
     folder : Path
-        Where jobs, their logs and their results lie.
+        Folder of jobs, logs and results.
     bundle : int
-        Tasks that one element of the array carries out, one after the other.
+        Tasks of one element of the array, one after the other.
     minutes : int
-        Time limit of an element; one that is preempted or runs out of time goes on where it was.
+        Time limit of an element; after preemption or timeout it goes on where
+        it was.
     threads : int
         Processors of an element.
     partition : str, optional
         Partition of the cluster.
     at_once : int
-        Elements that run at the same time, at most.
+        Most elements that run at the same time.
     cluster : {"slurm", "local"}
-        ``"local"`` runs the same jobs as processes of this machine, to try things.
+        ``"local"`` runs the same jobs as processes of this machine.
     """
 
     folder: Path

@@ -1,4 +1,4 @@
-"""Learning curves: which trials policies face in the course of a training, when, and how."""
+"""Learning curves: the trials that policies face during a training."""
 
 import time
 from collections.abc import Iterator
@@ -16,23 +16,23 @@ from kinarm.policies.config import TrainingConfig
 from kinarm.policies.learners import TrainingState, state_policy
 
 MOST_POINTS = 1000
-"""Points of a learning curve at most, or per decade of environment steps."""
+"""Most points of a learning curve, or per decade of environment steps."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class CurveTrials(Checked):
-    """Trials of their own for the learning curves, whose files then keep more.
+    """Separate trials for the learning curves.
 
-    That is, the final distance of every trial at every point of the curve, and the mean return of
-    every iteration.
+    Files then also keep the final distance of every trial at every point of the
+    curve, and the mean return of every iteration.
 
     Parameters
     ----------
     points : int
-        How often a policy faces the trials in the course of its training, at most.
+        Most times that a policy faces the trials during its training.
     spacing : {"even", "geometric"}
-        How the iterations lie apart after which it does; the last is among them, and with geometric
-        spacing it faces them before the first iteration as well.
+        Spacing of the iterations after which it does, the last included; with
+        geometric spacing also before the first.
     count, seed : int
         Number and seed of the trials.
     """
@@ -43,7 +43,7 @@ class CurveTrials(Checked):
     seed: int = field(default=1, metadata=FROM_ZERO)
 
     def iterations(self, last: int) -> frozenset[int]:
-        """After which iterations there is a point; the last is always among them."""
+        """After which iterations there is a point."""
         if self.spacing == "even":
             ends = np.linspace(0, last, self.points + 1)[1:].clip(1)
         else:
@@ -62,12 +62,12 @@ class TrialSettings(Checked):
     seed : int
         Seed of the trials.
     per_decade : int
-        How often a policy faces them in the course of its training while the environment steps
-        grow tenfold; 0 for at the end alone.
+        How often a policy faces them while its environment steps grow tenfold;
+        0 for at the end alone.
     first : int
-        Environment steps after which it faces them for the first time.
+        Environment steps after which it first faces them.
     curve : CurveTrials, optional
-        Other trials and times for the course of the training.
+        Other trials and times for the learning curves.
     """
 
     count: int = field(default=1000, metadata=TRIALS)
@@ -83,11 +83,11 @@ class CurvePoint(NamedTuple):
     Attributes
     ----------
     iteration, environment_steps : int
-        Iterations that are finished, and steps taken.
+        Finished iterations, and steps taken.
     success, collision : float
         Shares of the trials that ended so.
     median_distance : float
-        Of the final distances [m].
+        Median of the final distances [m].
     """
 
     iteration: int
@@ -98,7 +98,7 @@ class CurvePoint(NamedTuple):
 
     @classmethod
     def of(cls, state: TrainingState, rollouts: Rollouts) -> "CurvePoint":
-        """The point of the curve that rollouts of a policy make."""
+        """The point that rollouts of a policy make."""
         return cls(
             iteration=state.iteration,
             environment_steps=state.environment_steps,
@@ -110,12 +110,12 @@ class CurvePoint(NamedTuple):
 
 @dataclass(frozen=True)
 class Clock:
-    """How long a training took, without the trials that its policies faced.
+    """How long a training took, without the trials of its policies.
 
     Attributes
     ----------
     seconds, processor_seconds : float
-        Wall time, and time of all processors [s].
+        Wall time and processor time [s].
     points, processor_points : tuple of float
         The same at each point of the learning curve [s].
     """
@@ -128,7 +128,7 @@ class Clock:
 
 @dataclass(frozen=True)
 class Made(Clock):
-    """How a training was made: also the versions of packages, and the commit of kinarm's source."""
+    """The clock, the versions of packages and the commit of kinarm's source."""
 
     versions: dict[str, str] = field(default_factory=dict)
     commit: str = ""
@@ -136,16 +136,16 @@ class Made(Clock):
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class CurveSoFar:
-    """A learning curve, as it is kept beside the state of its training.
+    """A learning curve as it is kept beside the state of its training.
 
     Attributes
     ----------
     points : tuple of CurvePoint
-        The policy in the course of the training.
+        The policy during the training.
     distances : ndarray of float32, shape (n_points, n_trials), or empty
         Final distances at the points, if they are kept [m].
     clock : Clock
-        What the training took so far.
+        Time of the training until now.
     """
 
     points: tuple[CurvePoint, ...] = ()
@@ -154,14 +154,14 @@ class CurveSoFar:
 
 
 class Curve:
-    """The learning curve of a training under way, and the time that it took.
+    """The learning curve of a training under way, and its time.
 
     Parameters
     ----------
     config, trials : TrainingConfig and TrialSettings
         The training, and which trials its policies face.
     so_far : CurveSoFar
-        What there is of it.
+        The curve until now.
     """
 
     def __init__(self, config: TrainingConfig, trials: TrialSettings, so_far: CurveSoFar) -> None:
@@ -177,7 +177,7 @@ class Curve:
         simulator.rollout_actions(actions, first.starts, first.goals)  # before any clock runs
 
     def timed(self, states: Iterator[Any]) -> Iterator[Any]:
-        """The states of the training, whose making counts as its time."""
+        """The states of the training; the time that they take is counted."""
         began = time.perf_counter(), time.process_time()
         for state in states:
             self._spent += np.subtract((time.perf_counter(), time.process_time()), began)
@@ -185,7 +185,7 @@ class Curve:
             began = time.perf_counter(), time.process_time()
 
     def update(self, state: TrainingState) -> bool:
-        """Add a point, and its time, if it is time for one; whether it was."""
+        """Add a point and its time if one is due, and return whether it was."""
         if not self._is_due(state):
             return False
         policy, trials = state_policy(self._config, state), self._trials
@@ -197,7 +197,7 @@ class Curve:
         return True
 
     def _is_due(self, state: TrainingState) -> bool:
-        """Whether a point of the curve is reached that was not reached before."""
+        """Whether a new point of the curve is reached."""
         settings = self._settings
         if settings.curve is not None:
             return state.iteration in settings.curve.iterations(self._config.iterations)
@@ -210,7 +210,7 @@ class Curve:
         return bool(state.environment_steps >= due)
 
     def so_far(self) -> CurveSoFar:
-        """What there is of it now."""
+        """The curve until now."""
         times = tuple(zip(*self._times, strict=True)) or ((), ())
         clock = Clock(*self._spent.round(3).tolist(), *times)
         distances = np.array(self._distances, dtype=np.float32)

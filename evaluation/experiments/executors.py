@@ -1,4 +1,4 @@
-"""Where tasks are carried out: by this process, worker processes, or a cluster."""
+"""Where tasks run: this process, worker processes, or a cluster."""
 
 import os
 import pickle
@@ -20,7 +20,7 @@ from kinarm.errors import WorkerError
 
 
 class Failure(NamedTuple):
-    """Why a task came to nothing.
+    """Why a task failed.
 
     Attributes
     ----------
@@ -35,15 +35,16 @@ class Failure(NamedTuple):
 
 
 class Executor(Protocol):
-    """Where tasks are carried out."""
+    """Where tasks run."""
 
     def map(
         self, work: Callable[[Any], Any], tasks: Sequence[Any]
     ) -> Iterator[tuple[Any, Any | Failure]]:
         """Do the work for every task, begun in the given order; yield each task with its result.
 
-        Work, tasks and results can be pickled. What the work raises is the result of its task, as a
-        `Failure`. Abandoned or interrupted, an executor drops what is not finished.
+        Work, tasks and results can be pickled. What the work raises becomes a
+        `Failure`. An abandoned or interrupted executor drops what is not
+        finished.
 
         Raises
         ------
@@ -53,9 +54,9 @@ class Executor(Protocol):
 
 
 def attempt(work: Callable[[Any], Any], task: bytes) -> Any:
-    """Do the work for a pickled task; what goes wrong is returned as a `Failure`.
+    """Do the work for a pickled task; errors are returned as a `Failure`.
 
-    The learner of a task may be in a module of the current directory.
+    Its learner may be in a module of the current directory.
     """
     if str(Path.cwd()) not in sys.path:
         sys.path.append(str(Path.cwd()))
@@ -66,23 +67,23 @@ def attempt(work: Callable[[Any], Any], task: bytes) -> Any:
 
 
 WATCHED = 0.2
-"""How often a worker looks whether its parent is still there [s]."""
+"""How often a worker looks for its parent [s]."""
 
 REPLACED = "A worker stopped while some jobs were given to the executor"
-"""Loky warns so of a worker that it replaces because its memory has grown: kernels are no leak."""
+"""Loky's warning that a worker's memory has grown: kernels are no leak."""
 
 THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
-"""Environment variables by which libraries know on how many threads to run."""
+"""Environment variables for the number of threads of libraries."""
 
 
 @dataclass(frozen=True)
 class LocalExecutor:
-    """Worker processes of this machine, which end with this process however that ends.
+    """Worker processes of this machine, which end with this process.
 
     Parameters
     ----------
     jobs : int
-        Tasks at a time; a single one is carried out by this process.
+        Tasks at a time; a single one runs in this process.
     threads : int
         Threads of a worker.
     """

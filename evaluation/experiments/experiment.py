@@ -1,4 +1,4 @@
-"""An experiment: a file that names learners, problems, seeds and what varies."""
+"""An experiment: a file of learners, problems, seeds and what varies."""
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -13,11 +13,10 @@ from kinarm.evaluation.experiments.curve import TrialSettings
 
 MOST_TRAININGS = 100_000
 TRAININGS = {"at_most": MOST_TRAININGS}
-"""Trainings of an experiment at most: all of them are planned before the first begins."""
+"""Most trainings of an experiment: all are planned before the first begins."""
 
 SEVERAL = ("learners", "recipes", "problems")
-"""Entries of a file that are lists; a text stands for a list of one."""
-
+"""Entries of a file that are lists; a text is a list of one."""
 
 RANGE = ("low", "high", "log")
 
@@ -28,22 +27,21 @@ SEARCH_CHOICES = {
     "sampler": {"tpe": "TPESampler", "random": "RandomSampler", "cmaes": "CmaEsSampler"},
     "pruner": {"median": "MedianPruner", "none": "NopPruner", "hyperband": "HyperbandPruner"},
 }
-"""Choices of a search beside count and seed, and Optuna's names of them; the first of each is the
-default."""
+"""Choices of a search and Optuna's names of them, the defaults first."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Entry(Checked):
-    """A learner with a recipe and what is different about it.
+    """A learner with a recipe and settings of its own.
 
     Parameters
     ----------
     name : str
         Unique in the experiment; learner and recipe by default.
     title : str
-        Its name in tables and figures; what sets it apart by default.
+        Name in tables and figures; what sets it apart by default.
     source : str
-        Where its settings come from, for the record.
+        Where its settings come from.
     learner : str
         Name of the learner.
     recipe : str
@@ -51,10 +49,11 @@ class Entry(Checked):
     problems : tuple of str
         Names or files of problems; those of the experiment by default.
     seeds, first_seed : int, optional
-        Trainings with each setting, and seed of the first of them, as the experiment says by
-        default.
+        Trainings with each setting, and the first seed; those of the experiment
+        by default.
     fixed, grid : dict
-        Values of fields that stay, and lists of values, beside those of the experiment.
+        Fixed values of fields, and lists of values, added to those of the
+        experiment.
     """
 
     name: str = field(default="", metadata=OPTIONAL)
@@ -79,37 +78,40 @@ class Entry(Checked):
 
 @dataclass(frozen=True, kw_only=True)
 class Experiment(Checked):
-    """A set of trainings: every entry, problem, choice and seed with every other.
+    """A set of trainings: all combinations of entries, problems, choices and seeds.
 
-    Entries are given one by one, or are all learners with all recipes. Fields of settings are named
-    as in a recipe (``step_size``, ``reward.success``), those of a problem by their path
-    (``problem.task.start_spread``, ``problem.arm``). With the name of a learner in front
-    (``ars.step_size``), they concern that learner alone.
+    Fields are named as in a recipe (``step_size``, ``reward.success``), those
+    of a problem by path (``problem.task.start_spread``, ``problem.arm``). With
+    a learner in front (``ars.step_size``), they concern that learner alone.
 
     Parameters
     ----------
     name : str
-        How page and folder call it.
+        Name of page and folder.
     learners, recipes : tuple of str
-        Names of learners; names or files of recipes, the first of each learner by default.
+        Names of learners; names or files of recipes, the first of each learner
+        by default.
     entries : tuple of Entry
-        Learners with a recipe and settings of their own, instead of learners and recipes.
+        Used instead of all learners with all recipes.
     problems : tuple of str
         Names or files of problems.
     seeds, first_seed : int
-        Trainings with each setting, and seed of the first of them.
+        Trainings with each setting, and the first seed.
     trials : TrialSettings
         Which trials the policies face.
     bounds : bool
-        Find what any policy could reach in the trials.
+        Whether to find what any policy could reach in the trials.
     fixed, grid : dict
-        Values of fields that stay, and lists of values, of which all combinations are trained.
+        Fixed values of fields, and lists of values, of which all combinations
+        are trained.
     random : dict
-        ``count`` combinations, drawn by ``seed`` (0), of fields with a list of values, or a table
-        of ``low``, ``high`` and, to draw the logarithm evenly, ``log = true``.
+        ``count`` combinations, drawn by ``seed`` (0), of fields with a list of
+        values, or a table of ``low``, ``high`` and, for an even logarithm,
+        ``log = true``.
     search : dict
-        ``count`` combinations that Optuna proposes, by ``seed`` (0) and ``sampler`` (tpe), of
-        fields as in ``random``; ``pruner`` (median) says which trainings are broken off.
+        ``count`` combinations that Optuna proposes, by ``seed`` (0) and
+        ``sampler`` (tpe), of fields as in ``random``; ``pruner`` (median)
+        breaks trainings off.
     """
 
     name: str
@@ -164,7 +166,7 @@ class Experiment(Checked):
 
     @property
     def all_entries(self) -> tuple[Entry, ...]:
-        """The entries as given, or all learners with all recipes."""
+        """The entries given, or all learners with all recipes."""
         return self.entries or tuple(
             Entry(learner=learner, recipe=recipe)
             for learner, recipe in product(self.learners, self.recipes or ("",))
@@ -187,7 +189,7 @@ class Experiment(Checked):
         Raises
         ------
         InvalidInputError
-            If an entry is missing, unknown or wrong; in one line that names source, key and what
+            If an entry is missing, unknown or wrong; names source, key and what
             is expected.
         """
         made = _prepared(entries, SEVERAL)
@@ -200,15 +202,14 @@ class Experiment(Checked):
 
     @classmethod
     def load(cls, name_or_file: str | Path) -> "Experiment":
-        """Read a file, or find an experiment that ships with kinarm by its name.
+        """Read a file, or a shipped experiment by its name.
 
-        The name of a file is that of the experiment unless it says otherwise. Paths of problems and
-        recipes in it are relative to it.
+        By default it is named after its file. Paths are relative to the file.
 
         Raises
         ------
         InvalidInputError
-            If it cannot be used; in one line that names file, key and what is expected.
+            If it cannot be used; names file, key and what is expected.
         """
         file = named_file("experiment", name_or_file)
         entries = {"name": file.stem, **read_toml(file, "experiment")}
@@ -221,12 +222,13 @@ class Experiment(Checked):
         problems: Sequence[str] = (),
         seeds: int | None = None,
     ) -> "Experiment":
-        """A part of the experiment, or the same with other problems or seeds.
+        """A part of the experiment, or with other problems or seeds.
 
         Parameters
         ----------
         entries, problems : iterable of str
-            Names of entries, all by default; names or files of problems instead of its own.
+            Names of entries, all by default; names or files of problems, its
+            own by default.
         seeds : int, optional
             Trainings with each setting.
         """
@@ -245,7 +247,7 @@ class Experiment(Checked):
         )
 
     def resolved(self, folder: Path) -> "Experiment":
-        """The same experiment, with its files found from wherever it is read."""
+        """The experiment with absolute paths for files in a folder."""
 
         def found(name: str) -> str:
             beside = folder / name
@@ -265,7 +267,7 @@ def _check_distinct(name: str, values: Sequence[str]) -> None:
 
 
 def _check_tables(**tables: Mapping[str, Any]) -> None:
-    """Refuse fields that stand in two tables, and values that nothing can be made of."""
+    """Refuse fields in two tables, and wrong values."""
     given: dict[str, str] = {}
     for table, entries in tables.items():
         for key, entry in entries.items():
@@ -277,7 +279,7 @@ def _check_tables(**tables: Mapping[str, Any]) -> None:
 
 
 def _check_values(where: str, entry: Any, *, ranges: bool) -> None:
-    """Refuse what is neither a list of values nor, where there may be one, a range."""
+    """Refuse what is neither a list nor, where allowed, a range."""
     if isinstance(entry, list | tuple) or not ranges:
         if not isinstance(entry, list | tuple) or not entry:
             raise InvalidInputError(f"{where} must be a list of at least one value, got {entry!r}")
@@ -294,13 +296,13 @@ def _check_values(where: str, entry: Any, *, ranges: bool) -> None:
 
 
 def ranges_of(entries: Mapping[str, Any]) -> dict[str, Any]:
-    """Lists and ranges that are drawn or searched, by field."""
+    """Lists and ranges by field, without the other entries."""
     said = ("count", "seed", *SEARCH_CHOICES)
     return {key: entry for key, entry in entries.items() if key not in said}
 
 
 def _prepared(entries: Mapping[str, Any], several: Iterable[str]) -> dict[str, Any]:
-    """Entries of a file, with lists for texts, and with paths for tables within tables."""
+    """Entries of a file, with lists for texts, and nested tables flattened."""
     made = dict(entries)
     for name in several:
         single = name.removesuffix("s")
@@ -317,7 +319,7 @@ def _prepared(entries: Mapping[str, Any], several: Iterable[str]) -> dict[str, A
 def _flattened(
     entries: Mapping[str, Any], ranges: bool, path: str = ""
 ) -> Iterator[tuple[str, Any]]:
-    """Entries of tables within tables by their paths; tables that are ranges may stay whole."""
+    """Entries of nested tables by path; ranges may stay whole."""
     for key, entry in entries.items():
         if isinstance(entry, Mapping) and not (ranges and set(entry) & set(RANGE)):
             yield from _flattened(entry, ranges, f"{path}{key}.")

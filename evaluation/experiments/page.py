@@ -1,4 +1,4 @@
-"""Everything that is written of an experiment: tables, figures and a page."""
+"""The files about an experiment: tables, figures and a page."""
 
 import csv
 import io
@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from kinarm.evaluation.experiments.study import Study
 
 LINES, BARS = 8, 24
-"""How many groups of trainings a figure shows of a problem, the best ones."""
+"""Most groups that a figure shows of a problem, the best ones."""
 
 TITLES = {
     "learning_curves": "Learning curves",
@@ -39,10 +39,11 @@ TITLES = {
 
 
 def write_all(study: "Study", command: str = "") -> Path:
-    """Write what a study came to, and return the page.
+    """Write the results of a study, and return the page.
 
-    The files are ``index.html``, ``RESULTS.md``, ``results.json``, ``runs.csv``, ``curves.csv``,
-    ``runs.parquet`` if pyarrow is there, and the figures; ``command`` made them, for the record.
+    The files are ``index.html``, ``RESULTS.md``, ``results.json``,
+    ``runs.csv``, ``curves.csv``, ``runs.parquet`` if pyarrow is there, and the
+    figures; ``command`` is recorded.
 
     Raises
     ------
@@ -86,7 +87,7 @@ def _write_parquet(path: Path, rows: NDArray[Any]) -> None:
 
 
 def results_document(study: "Study", command: str) -> dict[str, Any]:
-    """Settings and results, as a dictionary that JSON can hold."""
+    """Settings and results as JSON holds them."""
     groups = study.groups()
     return {
         "command": command,
@@ -110,7 +111,7 @@ def _page(name: str, study: "Study", document: dict[str, Any], drawings: Mapping
     name : str
         Name of its template.
     study, document : Study and dict
-        The study, and its settings and results.
+        The study, its settings and results.
     drawings : mapping of str to str
         Figures as SVG, by name.
     """
@@ -140,7 +141,7 @@ def _page(name: str, study: "Study", document: dict[str, Any], drawings: Mapping
 
 
 def draw_all(study: "Study") -> dict[str, "Figure"]:
-    """All figures that a study has something for, by name."""
+    """All figures that a study has data for, by name."""
     figures = {draw.__name__: draw(study) for draw in (learning_curves, effects, beside_bound)}
     return {name: figure for name, figure in figures.items() if figure is not None}
 
@@ -154,10 +155,10 @@ def _by_problem(study: "Study") -> dict[str, list[Group]]:
 
 
 def learning_curves(study: "Study") -> "Figure | None":
-    """Success in the course of the training, against environment steps and against wall time.
+    """Success during the training, against environment steps and wall time.
 
-    A row per problem; lines are means over the training seeds, bands reach from the worst of them
-    to the best. Dotted is what the oracle reaches. None if nobody looked during the trainings.
+    A row per problem; lines are means over the seeds, bands are their ranges, and dotted is what
+    the oracle reaches. None without curves.
     """
     from matplotlib.ticker import NullFormatter
 
@@ -184,7 +185,7 @@ def learning_curves(study: "Study") -> "Figure | None":
 
 
 def _draw_curves(panels: "Sequence[Axes]", group: Group, number: int) -> None:
-    """Draw the mean over the seeds and the band of them, against steps and against seconds."""
+    """Draw the mean and the band of the seeds, against steps and seconds."""
     seeds = [
         np.array([(point.environment_steps, seconds, point.success) for point, seconds, _ in curve])
         for curve in (run.timed_curve for run in group.runs)
@@ -206,9 +207,8 @@ def _draw_curves(panels: "Sequence[Axes]", group: Group, number: int) -> None:
 def effects(study: "Study") -> "Figure | None":
     """Success by the value of each field that varies, a panel per field.
 
-    What is shown of a value is the mean over everything else that varies, with its 95 % interval
-    over seeds and trials; fields that were drawn from a range are shown training by training.
-    None if nothing varies.
+    Shown are means over everything else that varies, with 95 % intervals over seeds and trials;
+    for fields drawn from a range, all trainings. None if nothing varies.
     """
     fields = {name: runs for name, runs in _by_value(study).items() if len(runs) > 1}
     if not fields:
@@ -227,11 +227,11 @@ def effects(study: "Study") -> "Figure | None":
 
 
 ByValue = dict[str, tuple[Any, list[Run]]]
-"""Values of a field by what is shown of them, and the finished trainings that have them."""
+"""Values of a field by their text, with their finished trainings."""
 
 
 def _by_value(study: "Study") -> dict[str, ByValue]:
-    """Fields that can vary, by name."""
+    """Values of the fields that can vary, by field."""
     found: dict[str, ByValue] = {}
     for run in study.finished:
         varying = {**identity(run), **run.choices}
@@ -265,7 +265,7 @@ def _draw_effect(axes: "Axes", study: "Study", field: str, runs: ByValue) -> Non
 
 
 def _mean_success(study: "Study", runs: Sequence[Run]) -> Estimate:
-    """Mean success over everything but the seed, and its interval over seeds and trials."""
+    """Mean success, with its interval over seeds and trials."""
     by_seed: dict[int, list[NDArray[np.float64]]] = {}
     for run in runs:
         hits = study.finished[run].outcomes.success.astype(np.float64)
@@ -275,13 +275,13 @@ def _mean_success(study: "Study", runs: Sequence[Run]) -> Estimate:
 
 def _whiskers(estimate: Estimate) -> list[list[float]]:
     """Lengths of the interval below and above the value."""
-    value = float(estimate.value or 0.0)
+    value = estimate.value or 0.0
     low, high = estimate.ci95 or (value, value)
     return [[max(value - low, 0.0)], [max(high - value, 0.0)]]
 
 
 def beside_bound(study: "Study") -> "Figure | None":
-    """Success of each group with its 95 % interval, beside what the oracle reaches."""
+    """Success of each group with its 95 % interval, beside the oracle's."""
     problems = {name: groups[:BARS] for name, groups in _by_problem(study).items()}
     if not problems:
         return None
@@ -290,7 +290,7 @@ def beside_bound(study: "Study") -> "Figure | None":
     figure, panels = panels_figure(size, len(problems), 1, height_ratios=heights)
     for (problem, groups), axes in zip(problems.items(), panels.flat, strict=True):
         for row, group in enumerate(groups):
-            share = float(group.success.value or 0)
+            share = group.success.value or 0.0
             axes.barh(row, share, height=0.62, color=COLOURS[0], alpha=0.35)
             whiskers = _whiskers(group.success)
             axes.errorbar(share, row, xerr=whiskers, fmt="|", color=COLOURS[0], capsize=3)

@@ -27,7 +27,7 @@ CHOSEN = {"seed", "recipe"}
 """Settings that the experiment chooses."""
 
 DIGITS = 6
-"""Significant digits of numbers that are drawn: more could differ between machines."""
+"""Significant digits of drawn numbers: more could differ between machines."""
 
 PROBLEM = "problem."
 """Beginning of the path of a field of the problem."""
@@ -42,11 +42,11 @@ class Run:
     learner : str
         Name of the learner.
     config, plain : TrainingConfig and mapping
-        All of its settings, the arm of the problem pinned; the same as JSON holds them.
+        Its settings, the arm of the problem pinned; the same as in JSON.
     trials : TrialSettings
         Which trials its policies face.
     choices, entry : mapping and Entry
-        What of it varies in the experiment, by field; what it belongs to.
+        What varies in the experiment, by field; what it belongs to.
     """
 
     learner: str
@@ -58,7 +58,7 @@ class Run:
 
     @cached_property
     def settings(self) -> dict[str, Any]:
-        """Everything that its results depend on, as JSON holds it."""
+        """Everything that its results depend on, as in JSON."""
         return {
             "learner": self.learner,
             "config": to_plain(self.config) if self.plain is None else self.plain,
@@ -68,17 +68,17 @@ class Run:
 
     @cached_property
     def key(self) -> str:
-        """Hash of the settings; the name of its files."""
+        """Hash of the settings, which names its files."""
         return hash_of(self.settings)
 
     @property
     def can_extend(self) -> bool:
-        """Whether a training with more iterations begins just as this one goes."""
+        """Whether a training with more iterations begins just like this one."""
         return self.config.can_extend and self.trials.curve is None
 
     @cached_property
     def end_key(self) -> str:
-        """Hash of the settings but for the iterations; the name of the end that others extend."""
+        """Hash without the iterations, which names the file to extend."""
         config = {k: v for k, v in self.settings["config"].items() if k != "iterations"}
         return hash_of({**self.settings, "config": config})
 
@@ -99,20 +99,19 @@ def hash_of(entries: Any) -> str:
 def plan(
     experiment: Experiment, choices: Sequence[Mapping[str, Any]] | None = None
 ) -> tuple[Run, ...]:
-    """All trainings of an experiment, seed by seed, so that the first results cover everything.
+    """All trainings of an experiment, seed by seed: first results cover everything.
 
     Parameters
     ----------
     experiment : Experiment
-        The experiment.
+        What is trained.
     choices : sequence of mappings, optional
-        Values of what varies, by field; those of the experiment by default.
+        Values that vary, by field; those of the experiment by default.
 
     Raises
     ------
     KinarmError
-        If a name is unknown, a value has the wrong type or is refused; in one line that names the
-        field.
+        If a name is unknown, or a value is refused; names the field.
     """
     names = [entry.learner for entry in experiment.all_entries]
     learners = {each.name: each for each in map(find_learner, names)}
@@ -157,7 +156,7 @@ def drawn_choices(experiment: Experiment) -> Iterator[dict[str, Any]]:
 
 
 def _draw(entry: Any, uniform: float) -> Any:
-    """Value of a list or a range that a number from [0, 1) chooses; whole between whole numbers."""
+    """Value of a list or range for a number in [0, 1); whole between whole ones."""
     if isinstance(entry, list | tuple):
         return entry[int(uniform * len(entry))]
     low, high = entry["low"], entry["high"]
@@ -180,7 +179,7 @@ def _combinations(grid: Mapping[str, Any]) -> Iterator[dict[str, Any]]:
 def _settings(
     experiment: Experiment, entry: Entry, learners: Learners, varied: Sequence[Mapping[str, Any]]
 ) -> Iterator[tuple[TrainingConfig, dict[str, Any]]]:
-    """Settings of an entry on all of its problems, and what of them varies."""
+    """Settings of an entry on all of its problems, and what varies."""
     learner = find_learner(entry.learner)
     alone = {learner.name: learner}
     fixed = {
@@ -198,13 +197,13 @@ def _settings(
 
 
 def _concerning(entries: Mapping[str, Any], learner: str, learners: Learners) -> dict[str, Any]:
-    """Entries that concern a learner, without its name before them."""
+    """Entries that concern a learner, without its name."""
     found = ((_concerned(key, learners), value) for key, value in entries.items())
     return {paths[learner]: value for paths, value in found if learner in paths}
 
 
 def _concerned(key: str, learners: Learners) -> dict[str, str]:
-    """Names of the learners that a field concerns, and what it is called without them."""
+    """Learners that a field concerns, with its path without them."""
     owner, _, rest = key.partition(".")
     asked = {owner: rest} if owner in learners else dict.fromkeys(learners, key)
     known = {name: init_fields(learners[name].config) for name in asked}
@@ -237,7 +236,7 @@ def _config(entry: Entry, problem: ReachProblem, entries: Mapping[str, Any]) -> 
 
 
 def _put(table: dict[str, Any], path: str, value: Any) -> None:
-    """Put a value into tables within tables."""
+    """Put a value into nested tables."""
     *outer, name = path.split(".")
     for part in outer:
         table = table.setdefault(part, {})
@@ -254,9 +253,9 @@ def changed_problem(problem: ReachProblem, path: str, value: Any) -> ReachProble
     problem : ReachProblem
         The problem.
     path : str
-        Names of the fields that lead there: ``"task.start_spread"``, ``"scene"``.
+        Path of the field, such as ``"task.start_spread"`` or ``"scene"``.
     value : object
-        As `ReachProblem.replace` takes it, or as a problem file holds it.
+        As for `ReachProblem.replace`, or as in a problem file.
 
     Raises
     ------

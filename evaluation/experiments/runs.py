@@ -1,7 +1,7 @@
-"""One training of an experiment: how it is carried out, what it comes to, and its file.
+"""One training of an experiment: its run, its results and its file.
 
-Each function that reads a file raises `InvalidInputError` where it is missing or damaged, or of
-another training.
+Functions that read a file raise `InvalidInputError` if it is missing, damaged or of another
+training.
 """
 
 import io
@@ -30,11 +30,11 @@ ARCHIVE = ("study run", 1)
 """Kind and version of the files."""
 
 STATE, POLICY, OUTCOMES = "state", "policy.", "outcomes."
-"""Beginnings of the names of arrays; states are in files of version 1.0.0."""
+"""Beginnings of names of arrays; states are in files of version 1.0.0."""
 
 
 class TrialOutcomes(NamedTuple):
-    """How the trained policy did in every trial; arrays of shape (n_trials,).
+    """The trained policy in every trial; arrays of shape (n_trials,).
 
     Attributes
     ----------
@@ -62,17 +62,17 @@ class TrainedRun:
     Attributes
     ----------
     curve : tuple of CurvePoint
-        The policy in the course of the training, as often as the settings of the trials say.
+        The policy in the course of the training.
     last : CurvePoint
         The trained policy.
     outcomes : TrialOutcomes
         The trained policy in every trial.
     returns : ndarray, shape (n_iterations,), optional
-        Mean returns of the episodes of each iteration; kept with trials for the curve.
+        Mean returns of each iteration; kept with trials for the curve.
     curve_distance : ndarray of float32, shape (n_points, n_curve_trials), optional
-        Final distances at the points of the curve [m]; kept with trials for the curve.
+        Final distances at its points [m]; kept with trials for the curve.
     clock : Clock
-        How long it took; nothing if unknown.
+        How long it took; empty if unknown.
     """
 
     curve: tuple[CurvePoint, ...]
@@ -84,7 +84,7 @@ class TrainedRun:
 
     @property
     def timed_curve(self) -> list[tuple[CurvePoint, float, float]]:
-        """Points of the learning curve and its end, with wall and processor times [s], or NaN."""
+        """Points and end of the curve, with wall and processor times [s], or NaN."""
         clock, unknown = self.clock, (math.nan,) * len(self.curve)
         columns = [
             times if len(times) == len(self.curve) else unknown
@@ -98,14 +98,14 @@ class TrainedRun:
 
 
 class Start(NamedTuple):
-    """Where a training goes on: its state, and its learning curve so far."""
+    """Where a training goes on: its state and its learning curve so far."""
 
     state: Any
     curve: CurveSoFar
 
 
 class Task(NamedTuple):
-    """What an executor is given to do.
+    """A task of an executor.
 
     Attributes
     ----------
@@ -114,7 +114,7 @@ class Task(NamedTuple):
     start : Start or None
         Where the training goes on; None for its beginning.
     checkpoint : Path or None
-        Where it saves how far it is, if there is such a folder where it is carried out.
+        Where it saves its state, if the folder exists.
     """
 
     run: Run
@@ -123,15 +123,15 @@ class Task(NamedTuple):
 
 
 class TaskResult(NamedTuple):
-    """Result of a training, as it comes back from a worker.
+    """Result of a training from a worker.
 
     Attributes
     ----------
     content, end : bytes
-        What the file of the run holds, and that from which a longer one can go on; nothing if
-        none can.
+        Contents of the file of the run, and of that from which a longer one can
+        go on; empty if none can.
     clock, iterations : Clock and tuple
-        How long it took, and its iterations as its learner tells of them.
+        How long it took, and its iterations.
     """
 
     content: bytes
@@ -147,16 +147,16 @@ def train(
     on_point: Callable[[CurvePoint], object] | None = None,
     logs: Path | None = None,
 ) -> TaskResult:
-    """Train and evaluate; the result depends neither on threads nor on where a training goes on.
+    """Train and evaluate; neither threads nor interruptions change the result.
 
     Parameters
     ----------
     task, threads : Task and int
-        The training, and on how many threads.
+        The training, and its number of threads.
     on_point : callable, optional
-        Is told every point of the learning curve.
+        Called with every point of the learning curve.
     logs : Path, optional
-        Folder of the logs for TensorBoard, a folder in it for each seed.
+        Folder of logs for TensorBoard, with a folder for each seed.
     """
     run, start, checkpoint = task
     config, learner = run.config, find_learner(run.learner)
@@ -184,7 +184,7 @@ def train(
 
 
 def _run_content(run: Run, end: Start) -> bytes:
-    """A finished training as its file holds it; equal ones give equal bytes."""
+    """Content of the file of a training; equal ones give equal bytes."""
     policy, trials = state_policy(run.config, end.state), run.trials
     faced = trial_set(run.config.problem, trials.count, trials.seed)
     rollouts = faced.simulator.rollout(policy, faced.starts, faced.goals)
@@ -211,7 +211,7 @@ def _run_content(run: Run, end: Start) -> bytes:
 
 @contextmanager
 def _content_of(path: Path, run: Run, unless: tuple[str, ...]) -> Iterator[Archive]:
-    """Header and arrays of the file of a training, without arrays whose names begin so."""
+    """Header and arrays of a training's file, ``unless`` their names begin so."""
     content = load_archive(path, *ARCHIVE, InvalidInputError, unless=unless)
     with reading(repr(str(path)), ARCHIVE[0], InvalidInputError):
         if content.header["settings"] != run.settings:
@@ -227,14 +227,14 @@ def load_policy(path: Path, run: Run) -> Policy:
 
 
 def load_run(path: Path, run: Run, clock: Clock) -> TrainedRun:
-    """Read what a training came to.
+    """Read the results of a training.
 
     Parameters
     ----------
     path, run : Path and Run
         The file, and the training.
     clock : Clock
-        How long the training took.
+        How long it took.
     """
     with _content_of(path, run, (STATE, POLICY)) as (header, arrays):
         return TrainedRun(

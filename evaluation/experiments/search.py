@@ -1,4 +1,4 @@
-"""Search for the best settings of a learner, by Optuna, in the folder of an experiment."""
+"""Search for the best settings of a learner, by Optuna."""
 
 from collections.abc import Mapping
 from functools import partial
@@ -29,14 +29,14 @@ JOURNAL, RECIPE = "search.journal", "best.toml"
 
 
 def open_search(experiment: Experiment, folder: Path, draws: int = 0) -> "optuna.study.Study":
-    """Open the search of the experiment in a folder, or begin it.
+    """Open or begin the search of an experiment in a folder.
 
     Parameters
     ----------
     experiment, folder : Experiment and Path
         The experiment and its folder.
     draws : int
-        What tells the random numbers of this process from those of others.
+        Tells the random numbers of this process from those of others.
     """
     try:
         import optuna
@@ -64,14 +64,14 @@ def open_search(experiment: Experiment, folder: Path, draws: int = 0) -> "optuna
 
 
 def carry_out_search(experiment: Experiment, folder: Path, jobs: int, threads: int) -> None:
-    """Try settings until there are as many as the study says; what was under way is tried again.
+    """Try as many settings as the experiment says, interrupted ones again.
 
     Parameters
     ----------
     experiment, folder : Experiment and Path
         The experiment and its folder, to which no other process may write.
     jobs, threads : int
-        Settings that are tried at a time, and threads of a training.
+        Settings tried at a time, and threads of a training.
     """
     # A process that was killed may have left its lock.
     for left in folder.glob(f"{JOURNAL}.lock*"):
@@ -95,7 +95,7 @@ def carry_out_search(experiment: Experiment, folder: Path, jobs: int, threads: i
 
 
 FAILURES = 20
-"""Proposals of a worker that may be impossible before they count."""
+"""Impossible proposals of a worker before they count."""
 
 
 def _try_settings(
@@ -153,7 +153,7 @@ def _suggest(trial: Any, key: str, entry: Any) -> Any:
 
 
 def searched_runs(experiment: Experiment, folder: Path) -> tuple[Run, ...]:
-    """The trainings of the settings that were tried to the end, in their order."""
+    """The trainings of settings that were tried to the end, in order."""
     trials = open_search(experiment, folder).trials if (folder / JOURNAL).exists() else []
     complete = [trial for trial in trials if trial.state.name == "COMPLETE"]
     return plan(experiment, [_choices(experiment, trial) for trial in complete])
@@ -169,6 +169,6 @@ def _choices(experiment: Experiment, trial: Any) -> dict[str, Any]:
 
 
 def recipe_entries(config: TrainingConfig) -> dict[str, Any]:
-    """Settings as a recipe file holds them: all but what differs from training to training."""
+    """Settings of a recipe file, without those of a single training."""
     entries = to_plain(config)
     return {name: entries[name] for name in entries if name not in (*PER_TRAINING, "recipe")}

@@ -1,4 +1,4 @@
-"""Several training seeds of one recipe: an experiment that leaves a policy of each."""
+"""Several training seeds of one recipe, as an experiment."""
 
 import re
 import shutil
@@ -26,10 +26,10 @@ from kinarm.policies.provenance import plain_settings
 from kinarm.policies.training import TrainRequest, curve_path, say_findings, write_curve
 
 TRIALS = TrialSettings(count=200, per_decade=0)
-"""Trials that each policy faces at the end; figures of merit are for ``kinarm-eval``."""
+"""Trials that each policy faces at the end."""
 
 UNDER_WAY = ".training"
-"""Folder, beside the policies, of what is under way."""
+"""Folder of unfinished trainings, beside the policies."""
 
 
 class TrainedSeed(NamedTuple):
@@ -42,7 +42,7 @@ class TrainedSeed(NamedTuple):
     out : Path
         File of its policy.
     last : CurvePoint or None
-        Its last iteration; None if it was finished earlier.
+        Its last iteration; None if finished earlier.
     """
 
     seed: int
@@ -117,7 +117,7 @@ def train_seeds(
 
 
 def _check_files(training: TrainRequest, under_way: Path, outs: Mapping[Run, Path]) -> None:
-    """Refuse files that are in the way, or that are missing."""
+    """Refuse files that are in the way or missing."""
     if training.resume:
         if not under_way.exists() and not any(out.exists() for out in outs.values()):
             raise PolicyFileError(f"nothing to resume: there is no {str(under_way)!r}")
@@ -133,7 +133,7 @@ def _check_files(training: TrainRequest, under_way: Path, outs: Mapping[Run, Pat
 def _is_finished(training: TrainRequest, run: Run, out: Path) -> bool:
     """Whether a training is to go on and has left its policy.
 
-    With ``overwrite``, a policy with other settings is one that was to be replaced.
+    With ``overwrite``, a policy with other settings is to be replaced.
     """
     if not training.resume or not out.exists():
         return False

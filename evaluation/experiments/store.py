@@ -30,31 +30,31 @@ FOLDERS = ("runs", "made", "failed", "checkpoints", "ends")
 class Store:
     """The folder of an experiment and its results.
 
-    Every finished training is one file under the hash of its settings, ``runs/KEY.npz``, and there
-    is no other state: what has no such file is still to be done. How long it took, which no two
-    machines agree on, lies apart in ``made/KEY.json``; why a training failed, until it succeeds, in
-    ``failed/KEY.json``; how far it is in ``checkpoints/KEY.npz``; and from where longer ones can go
-    on in ``ends``. A file that is damaged counts as missing.
+    Every finished training is one file under the hash of its settings, ``runs/KEY.npz``; what has
+    none is still to be done. How long it took, which differs between machines, is in
+    ``made/KEY.json``; why it failed, until it succeeds, in ``failed/KEY.json``; how far it is in
+    ``checkpoints/KEY.npz``; and where longer ones can go on in ``ends``. A damaged file counts as
+    missing.
     """
 
     folder: Path
 
     def path(self, kind: str, run: Run) -> Path:
-        """Where something is kept of a training, in one of the folders."""
+        """File of a training in one of the folders."""
         key = run.end_key if kind == "ends" else run.key
         suffix = ".json" if kind in ("made", "failed") else ".npz"
         return self.folder / kind / f"{key}{suffix}"
 
     @contextmanager
     def writing(self, experiment: Experiment) -> Iterator["Store"]:
-        """Claim the folder for an experiment, and keep other processes from writing to it.
+        """Claim the folder for an experiment and keep other writers out.
 
         Raises
         ------
         InvalidInputError
             If it is the folder of another experiment.
         OutputError
-            If it cannot be written to, or another process does.
+            If it cannot be written to, or another process writes to it.
         """
         check_folder(self.folder)
         marker = self.folder / SPECIFICATION
@@ -70,7 +70,7 @@ class Store:
             yield self
 
     def save(self, run: Run, result: TaskResult | Failure) -> None:
-        """Keep what a training came to, or why it failed."""
+        """Keep the result of a training, or why it failed."""
         failure = self.path("failed", run)
         if isinstance(result, Failure):
             entries = {"name": run.name, **result._asdict()}
@@ -85,7 +85,7 @@ class Store:
         self.path("checkpoints", run).unlink(missing_ok=True)
 
     def load(self, runs: Iterable[Run]) -> dict[Run, TrainedRun]:
-        """Read those of the trainings that are finished."""
+        """Read the trainings that are finished."""
         found = {}
         for run in runs:
             with suppress(InvalidInputError):
@@ -93,7 +93,7 @@ class Store:
         return found
 
     def start(self, run: Run) -> Start | None:
-        """Where a training can go on that was interrupted, or that a shorter one began."""
+        """Where a training goes on that was interrupted or begun by a shorter one."""
         paths, found = [self.path("checkpoints", run)], []
         if run.can_extend:
             paths.append(self.path("ends", run))
@@ -105,7 +105,7 @@ class Store:
         return max(found, key=lambda start: start.state.iteration, default=None)
 
     def shares(self, runs: Iterable[Run]) -> list[float]:
-        """Shares that are done of trainings under way, by their latest checkpoints."""
+        """Finished shares of trainings under way, by their checkpoints."""
         keys, found = {run.key for run in runs}, []
         for path in self.folder.glob("checkpoints/*.npz"):
             if path.stem in keys:
@@ -114,7 +114,7 @@ class Store:
         return found
 
     def made(self, run: Run) -> Made:
-        """How a training was made; nothing of it if unknown."""
+        """How a training was made; empty if unknown."""
         with suppress(InvalidInputError):
             return from_plain(Made, self._record("made", run), "record")
         return Made()

@@ -1,4 +1,4 @@
-"""A study: an experiment in its folder, how to carry it out, and what it came to."""
+"""A study: an experiment in its folder, how to run it, and its results."""
 
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -39,17 +39,17 @@ class Study:
     Parameters
     ----------
     experiment : Experiment, mapping, str or Path
-        What is trained: an experiment, what its ``to_json`` returns, the name of a shipped one, or
-        a file.
+        An experiment, what its ``to_json`` returns, the name of a shipped one,
+        or a file.
     folder : str or Path
-        Where the trainings lie, or will.
+        Folder of the trainings.
     runs : tuple of Run, optional
-        The trainings, instead of those that the experiment plans.
+        The trainings, instead of those of the experiment.
 
     Raises
     ------
     KinarmError
-        If the experiment cannot be used; in one line that names file and field.
+        If the experiment cannot be used; names file and field.
     """
 
     def __init__(
@@ -69,14 +69,14 @@ class Study:
             raise InvalidInputError(f"{experiment.name}: {error}") from error
 
     def _planned(self) -> tuple[Run, ...]:
-        """The trainings of the experiment, or those that a search chose."""
+        """The trainings of the experiment, or of its search."""
         if self.experiment.search:
             return searched_runs(self.experiment, self.store.folder)
         return plan(self.experiment)
 
     @classmethod
     def load(cls, folder: str | Path) -> "Study":
-        """Read the experiment that lies in a folder.
+        """Read the experiment in a folder.
 
         Raises
         ------
@@ -107,29 +107,30 @@ class Study:
         logs: Path | None = None,
         on_trained: Callable[[Run, TaskResult], object] = lambda *_: None,
     ) -> "Study":
-        """Run the missing trainings; after any interruption, the same call goes on.
+        """Run the missing trainings; after an interruption, the same call goes on.
 
-        A training that fails does not stop the others. The next call tries it again.
+        A training that fails does not stop the others; the next call tries it
+        again.
 
         Parameters
         ----------
         jobs, threads : int
-            Trainings at a time, one a processor by default, and threads of each; they do not change
-            what it comes to.
+            Trainings at a time, one a processor by default, and threads of
+            each; neither changes results.
         executor : Executor, optional
-            Where trainings are carried out; worker processes of this machine by default.
+            Where trainings run; processes of this machine by default.
         logs : Path, optional
             Folder of the logs for TensorBoard.
         on_trained : callable
-            Is told of every training that is finished.
+            Called with every finished training and its result.
 
         Raises
         ------
         TrainingFailedError
-            If trainings failed; all others are finished then.
+            If trainings failed; all others are finished.
         KinarmError
-            If the folder is that of another experiment or cannot be written to, a package is
-            missing, or workers end unexpectedly.
+            If the folder is of another experiment or cannot be written to, a
+            package is missing, or workers end unexpectedly.
         """
         whole_number("threads", threads, 1)
         jobs = available_threads() if jobs is None else whole_number("jobs", jobs, 1)
@@ -164,7 +165,7 @@ class Study:
 
     @contextmanager
     def _progress(self, total: int, done: list[str]) -> Iterator[Callable[[], None]]:
-        """Show how many trainings are done, which was last, and meanwhile how far others are."""
+        """Show how many trainings are done, and how far others are."""
         over = Event()
 
         def show() -> None:
@@ -194,7 +195,7 @@ class Study:
             self.__dict__.pop(name, None)
 
     def status(self) -> list[str]:
-        """How far it is, in lines, while it runs or after it was stopped."""
+        """How far it is, in lines."""
         remain = [run for run in self.runs if not self.store.path("runs", run).exists()]
         finished = len(self.runs) - len(remain)
         told = [f"{self.experiment.name}: {finished} of {len(self.runs)} trainings finished"]
@@ -208,7 +209,7 @@ class Study:
 
     @cached_property
     def finished(self) -> Mapping[Run, TrainedRun]:
-        """The trainings that are finished, in the order of the experiment."""
+        """The finished trainings, in the order of the experiment."""
         return self.store.load(self.runs)
 
     @property
@@ -218,7 +219,7 @@ class Study:
 
     @cached_property
     def bounds(self) -> Mapping[str, OracleSolutions]:
-        """Bounds of the trials that finished trainings faced, by the problem's hash."""
+        """Bounds of the trials of finished trainings, by the problem's hash."""
         trials, wanted = self.experiment.trials, self.finished if self.experiment.bounds else ()
         problems = {run.config.problem.digest: run.config.problem for run in wanted}
         return {
@@ -228,12 +229,12 @@ class Study:
 
     @property
     def failures(self) -> Mapping[Run, str]:
-        """Why trainings failed that were not finished since."""
+        """Errors of trainings that failed and were not finished since."""
         found = {run: self.store.failure(run) for run in self.missing}
         return {run: error for run, error in found.items() if error is not None}
 
     def policy(self, run: Run) -> Policy:
-        """The policy of a finished training, with versions and commit that made it.
+        """The policy of a finished training, with its versions and commit.
 
         Raises
         ------
@@ -246,7 +247,7 @@ class Study:
         return replace(policy, provenance=origin)
 
     def groups(self) -> tuple[Group, ...]:
-        """The finished trainings, those with the same settings but for the seed together."""
+        """The finished trainings, in groups that differ in the seed alone."""
         return self._groups
 
     @cached_property
@@ -268,12 +269,12 @@ class Study:
         )
 
     def best(self, count: int = 1) -> tuple[Group, ...]:
-        """The settings with the largest success over what the oracle reaches, best first."""
+        """The groups with the largest relative success, best first."""
         ordered = sorted(self.groups(), key=lambda group: -group.relative_success)
         return tuple(ordered[:count])
 
     def _label(self, run: Run) -> str:
-        """Name of the trainings with the settings of a run."""
+        """Label of the group of a run."""
         experiment, names = self.experiment, identity(run)
         if experiment.entries:
             parts = [run.entry.title or run.entry.name]
@@ -291,7 +292,7 @@ class Study:
         return list(dict.fromkeys(field for run in self.finished for field in run.choices))
 
     def rows(self) -> list[dict[str, Any]]:
-        """One row per finished training: learner, varied fields, figures of merit, times."""
+        """One row per finished training."""
         fields = self.varied
         rows = []
         for run, trained in self.finished.items():
@@ -313,7 +314,7 @@ class Study:
         return rows
 
     def table(self) -> NDArray[Any]:
-        """The `rows` as a structured array; fields that are no numbers are texts."""
+        """The `rows` as a structured array of numbers and texts."""
         rows = self.rows()
         columns = {name: _column([row[name] for row in rows]) for name in (rows[0] if rows else ())}
         kinds = [(name, column.dtype) for name, column in columns.items()]
@@ -321,6 +322,6 @@ class Study:
 
 
 def _column(values: Sequence[Any]) -> NDArray[Any]:
-    """Values of one kind as an array: numbers if all of them are, else texts."""
+    """Values as an array of numbers, or else of texts."""
     numbers = all(isinstance(each, bool | int | float) for each in values)
     return np.array(values if numbers else ["" if v is None else shown(v) for v in values])

@@ -1,4 +1,4 @@
-"""Groups of finished trainings, seeds of the same settings together, and tables of them."""
+"""Groups of finished trainings, and tables of them."""
 
 import math
 from collections.abc import Callable, Mapping
@@ -24,19 +24,19 @@ if TYPE_CHECKING:
 FIGURES = (
     *("success", "relative_success", "collision", "median_distance", "median_steps", "step_ratio"),
 )
-"""Figures of merit that a row tells of a training, as in `kinarm.evaluation.METRICS`."""
+"""Figures of merit in a row, as in `kinarm.evaluation.METRICS`."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Group:
-    """Finished trainings with the same settings but for the seed, at least one.
+    """Finished trainings, at least one, that differ in the seed alone.
 
     Attributes
     ----------
     label : str
-        What sets them apart from the other groups of the experiment.
+        What sets them apart from other groups.
     entry, config, choices : Entry, TrainingConfig and mapping
-        What they belong to, settings of the first of them, and what of these varies, by field.
+        What they belong to, settings of the first, and what varies, by field.
     runs : tuple of TrainedRun
         The trainings by seed.
     bounds : OracleSolutions or None
@@ -57,18 +57,18 @@ class Group:
 
     @cached_property
     def success(self) -> Estimate:
-        """Share of trials with success, and its 95 % interval over seeds and trials."""
+        """Share of successful trials, and its 95 % interval over seeds and trials."""
         return share_over_seeds(self.hits)
 
     @cached_property
     def reachable(self) -> float:
-        """Share of the trials in which the oracle reaches; 1 if that is not known."""
+        """Share of trials that the oracle solves; 1 if unknown."""
         return 1.0 if self.bounds is None else float(self.bounds.reachable.mean())
 
     @property
     def relative_success(self) -> float:
         """Success over what the oracle reaches."""
-        return float(self.success.value or 0.0) / max(self.reachable, 1e-9)
+        return (self.success.value or 0.0) / max(self.reachable, 1e-9)
 
     @cached_property
     def figures(self) -> dict[str, float]:
@@ -82,25 +82,25 @@ class Group:
 
     @property
     def processor_seconds(self) -> float:
-        """Time of all processors that a training took, mean over the seeds [s]."""
+        """Processor time of a training, mean over the seeds [s]."""
         return float(np.mean([run.clock.processor_seconds for run in self.runs]))
 
     @property
     def steps_to_success(self) -> float | None:
-        """Median steps of trials with success, mean over the seeds; None if a seed has none."""
+        """Median steps of successful trials, mean over seeds; None if a seed has none."""
         if not self.hits.any(axis=1).all():
             return None
         each = [np.median(run.outcomes.steps[run.outcomes.success]) for run in self.runs]
         return float(np.mean(each))
 
     def until(self, level: float) -> tuple[float, float, float]:
-        """Effort until policies first succeed in a share of trials; medians over seeds.
+        """Effort until policies reach a level of success; medians over seeds.
 
         Returns
         -------
         tuple of float
-            Environment steps, wall time and processor time [s]; infinity for never, NaN where the
-            times are not known.
+            Environment steps, wall time and processor time [s]; infinity for
+            never, NaN for unknown times.
         """
         needed = []
         for run in self.runs:
@@ -147,11 +147,11 @@ def shown(value: Any) -> str:
 
 
 LEVELS = (0.5, 0.8)
-"""Shares of success by which the speed of learning is told."""
+"""Shares of success that measure the speed of learning."""
 
 
 class Column(NamedTuple):
-    """A column of the table of groups, wherever it is shown: heading, and what it says of one."""
+    """A column of the table of groups."""
 
     heading: str
     text: Callable[[Group], str]
@@ -170,7 +170,7 @@ def _interval(group: Group) -> str:
 
 
 def _until(level: float) -> Callable[[Group], str]:
-    """Environment steps [thousands] and processor time [min] until a share of trials succeeds."""
+    """Environment steps [thousands] and processor time [min] to a success level."""
 
     def text(group: Group) -> str:
         steps, _, seconds = group.until(level)
@@ -199,7 +199,7 @@ COLUMNS = (
     Column("minutes", lambda group: f"{group.processor_seconds / 60:.2f}"),
     *(Column(f"thousand steps, minutes to {level:.0%}", _until(level)) for level in LEVELS),
 )
-"""Columns of a group; minutes are processor time without the trials of the policies."""
+"""Minutes are processor time without the trials of the policies."""
 
 
 def group_row(group: Group) -> tuple[str, ...]:
@@ -225,9 +225,9 @@ def curve_rows(study: "Study") -> list[dict[str, Any]]:
 
 
 def group_entries(group: Group) -> dict[str, Any]:
-    """A group, as a dictionary that JSON can hold.
+    """A group as JSON holds it.
 
-    ``ci95`` is over seeds and trials, ``ci95_of_trials`` over trials that the seeds share.
+    ``ci95`` is over seeds and trials, ``ci95_of_trials`` over the trials alone.
     """
     touched = np.array([run.outcomes.collision for run in group.runs])
     return {

@@ -1,1 +1,1 @@
-"""The paper: its claims, figures and tables, from the trainings of the reproduction."""
+"""The paper: its claims, figures and tables, reproduced."""

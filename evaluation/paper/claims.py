@@ -26,12 +26,12 @@ LEARNING_LEVELS = (
     *((0.1, 0.25), (0.1, 0.5)),
     *((0.05, 0.25), (0.05, 0.5)),
 )
-"""Distances [m] and shares of trials by which the speed of learning is measured."""
+"""Distances [m] and shares of trials that measure the speed of learning."""
 
 
 @dataclass(frozen=True)
 class ClaimPart:
-    """A statistic, named with its unit, that a claim puts on one side of a threshold."""
+    """A statistic that a claim puts on one side of a threshold."""
 
     measure: str
     estimate: Estimate
@@ -40,7 +40,7 @@ class ClaimPart:
 
     @property
     def verdict(self) -> Verdict:
-        """Where the interval lies: on the claimed side, on the other one, or on both."""
+        """Whether the interval lies on the claimed side, the other one, or both."""
         low, high = self.estimate.ci95 or (self.threshold, self.threshold)
         if low <= self.threshold <= high:
             return "undecided"
@@ -59,9 +59,9 @@ class Claim:
     statement : str
         The finding.
     parts : tuple of ClaimPart
-        Its meaning in numbers; all have to be so.
+        Its meaning in numbers; all parts have to hold.
     judged : bool
-        Whether the trainings are such that it can be judged.
+        Whether the trainings are long enough to judge it.
     """
 
     name: str
@@ -100,7 +100,7 @@ class Claim:
 
 
 def assess(results: PaperResults, reading: Reading = LITERAL) -> tuple[Claim, ...]:
-    """All claims that can be judged under a reading; the sweep follows the literal one."""
+    """All claims that can be judged under a reading; the sweep is in the literal one."""
     claims = [
         *(_mostly_near(results, reading, task) for task in ("left", "right")),
         _both_is_worse(results, reading),
@@ -155,12 +155,11 @@ def _one_bench_is_poor(results: PaperResults, reading: Reading) -> Claim:
 
 
 def bench_shares(near: NDArray[np.bool_], left: NDArray[np.bool_]) -> tuple[Estimate, Estimate]:
-    """Share of hits on the better and on the worse bench of every seed's policy.
+    """Share of hits on each policy's better and worse bench.
 
     Whether a trial hit, shape (n_seeds, n_trials), and its goal lies on the left, (n_trials,).
-    Which bench is the better one is told by one half of the trials and measured on the other, and
-    the other way round: picking the larger of two noisy shares would flatter it. Where a bench has
-    no trials in one of the halves, there is nothing to tell.
+    Each half of the trials tells which bench is better, and the other measures it: picking the
+    larger of two noisy shares would flatter it. Unknown where a bench has no trials in a half.
     """
     half = np.arange(near.shape[1]) % 2 == 0
     groups = [[part & bench for bench in (left, ~left)] for part in (half, ~half)]
@@ -200,7 +199,7 @@ def _ars_needs_fewer_steps(results: PaperResults, reading: Reading) -> Claim:
 
 
 def steps_to_levels(runs: Iterable[PaperRun]) -> NDArray[np.float64]:
-    """Environment steps to `LEARNING_LEVELS`, shape (n_levels, n_runs); infinity for never."""
+    """Steps to `LEARNING_LEVELS`, shape (n_levels, n_runs); infinity for never."""
     return np.array([[run.steps_to_level(*level) for level in LEARNING_LEVELS] for run in runs]).T
 
 
@@ -222,8 +221,7 @@ def _low_rate_is_worse(results: PaperResults) -> Claim:
 def _many_perturbations_are_worse(results: PaperResults) -> tuple[Claim, Claim]:
     """Section 3.3: too many perturbations may not be desirable.
 
-    Judged twice: after as many iterations, and after as many environment steps, of which more
-    perturbations take more.
+    Judged after as many iterations, and after as many environment steps.
     """
     sweep = results.sweep()
     most = max(perturbations for _, perturbations in sweep)
@@ -245,7 +243,7 @@ def _many_perturbations_are_worse(results: PaperResults) -> tuple[Claim, Claim]:
 
 
 def _difference(measure: str, groups: Sequence[tuple[bool, NDArray[Any]]]) -> ClaimPart:
-    """Mean of the chosen groups of trainings, less that of the others, claimed to be above zero."""
+    """Mean of the chosen groups less that of the others, claimed above zero."""
     n = sum(chosen for chosen, _ in groups)
     terms = [(1.0 / n if chosen else -1.0 / (len(groups) - n), values) for chosen, values in groups]
     return ClaimPart(measure, contrast(terms), "above", 0.0)

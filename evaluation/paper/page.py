@@ -1,4 +1,4 @@
-"""The page of the reproduction, with the paper's figures, claims, tables and policies beside it."""
+"""The files of the reproduction: page, figures, claims, table and policies."""
 
 import json
 from collections.abc import Iterable, Mapping, Sequence
@@ -38,24 +38,24 @@ STYLES: dict[str, dict[str, Any]] = {
     "ars": {"label": LEARNERS["ars"], "color": COLOURS[0], "linestyle": "solid"},
     "ppo": {"label": LEARNERS["ppo"], "color": COLOURS[1], "linestyle": "dashed"},
 }
-"""How lines of a learner look; its seeds are drawn thin and faint in the same colour."""
+"""Lines of a learner; its seeds are thin and faint in the same colour."""
 
 SHOWN_DISTANCE, NARROWEST = 1.2, 0.005
-"""Where the axes of final distances end, and the least bandwidth of a density [m]."""
+"""End of the axes of final distances, and least bandwidth of a density [m]."""
 
 SMOKE = (
     "A smoke run: each of {} trainings took a few iterations, to see that everything works. Its "
     "figures mean nothing, and no claim is judged."
 )
-"""A warning about trainings that judge no claim."""
+"""Warning about trainings that judge no claim."""
 
 CLAIM_COLUMNS = ("claim", "measure", "measured (95 %)", "claimed", "verdict")
 
 
 def write_all(study: Study, command: str) -> Sequence[Claim]:
-    """Write all files of the finished reproduction, and return the claims read literally.
+    """Write all files of the reproduction, and return the claims read literally.
 
-    The command that made it is recorded.
+    The command is recorded.
     """
     results, folder = PaperResults.of(study), study.store.folder
     claims = {reading: assess(results, reading) for reading in results.readings}
@@ -75,7 +75,7 @@ def write_all(study: Study, command: str) -> Sequence[Claim]:
 
 
 def _save_policies(study: Study, results: PaperResults) -> list[str]:
-    """Write every policy to a file of its own, and return the commits that they were made at."""
+    """Write every policy to a file, and return their commits."""
     folder, commits = study.store.folder / "policies", set()
     check_folder(folder)
     for run in results.runs:
@@ -88,7 +88,7 @@ def _save_policies(study: Study, results: PaperResults) -> list[str]:
 def claims_document(
     results: PaperResults, claims: Claims, command: str, commits: list[str]
 ) -> dict[str, Any]:
-    """All verdicts and what they stand on, as ``claims.json`` holds them."""
+    """All verdicts and their evidence, as ``claims.json`` holds them."""
     trials = to_plain(results.experiment.trials)
     curve = trials["curve"]
     return {
@@ -156,7 +156,7 @@ def run_rows(results: PaperResults) -> list[dict[str, Any]]:
 
 
 def claim_rows(claims: Iterable[Claim]) -> list[tuple[str, ...]]:
-    """Claims with what was measured; one row per part of a claim."""
+    """One row per part of a claim."""
     return [
         (
             claim.statement if part is claim.parts[0] else "",
@@ -200,8 +200,8 @@ def figure_2(results: PaperResults) -> "Figure":
 def figure_3(results: PaperResults) -> "Figure":
     """Densities of the final distances of ARS and PPO, a row per task (paper, Figure 3).
 
-    The oracle's is drawn behind them: what could be reached. Heights are square roots, so that
-    broad and narrow densities can be told apart beside each other.
+    Behind them is the oracle's. Heights are square roots, which show broad and narrow densities
+    side by side.
     """
     figure, panels = panels_figure((7.5, 8.4), len(PROBLEMS), 1, sharex=True)
     for number, (task, axes) in enumerate(zip(PROBLEMS, panels[:, 0], strict=True), start=1):
@@ -228,8 +228,8 @@ def figure_3(results: PaperResults) -> "Figure":
 def density(samples: NDArray[np.float64], positions: NDArray[np.float64]) -> NDArray[np.float64]:
     """Kernel density of distances, reflected at zero so that none is lost below it.
 
-    The kernel is normal, with Silverman's robust bandwidth: a few trials that end far away must
-    not blur where the many end. From samples, shape (n,), and positions, shape (m,) [m], to
+    The kernel is normal, with Silverman's robust bandwidth, because a few trials that end far away
+    must not blur the others. From samples, shape (n,), and positions, shape (m,) [m], to
     densities, shape (m,) [1/m], whose integral over positive distances is 1.
     """
     from scipy.stats import iqr, norm
@@ -243,7 +243,7 @@ def density(samples: NDArray[np.float64], positions: NDArray[np.float64]) -> NDA
 
 
 def learning_curves(results: PaperResults, against: Literal["steps", "time"]) -> "Figure":
-    """How well policies do in the course of their training, by steps or time, a column per task."""
+    """How well policies do in the course of training, a column per task."""
     figure, panels = panels_figure((10.5, 6.4), 2, len(PROBLEMS), sharex=True, sharey="row")
     in_time = against == "time"
     for task, (above, below) in zip(PROBLEMS, panels.T, strict=True):
@@ -268,6 +268,6 @@ def learning_curves(results: PaperResults, against: Literal["steps", "time"]) ->
 def _seeds_and_mean(
     axes: "Axes", x: NDArray[np.float64], y: NDArray[np.float64], style: dict[str, Any], lw: float
 ) -> None:
-    """Curves of the seeds faintly, and the mean of what they do at the same place boldly."""
+    """Curves of the seeds faintly, and their mean boldly."""
     axes.plot(x.T, y.T, color=style["color"], lw=0.6, alpha=0.5)
     axes.plot(x.mean(axis=0), y.mean(axis=0), lw=lw, **style)

@@ -1,4 +1,4 @@
-"""The finished trainings of the reproduction, grouped as claims, tables and figures need them."""
+"""The finished trainings of the reproduction, in order."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -17,25 +17,25 @@ from kinarm.policies.ars import Sharing
 from kinarm.problem import PROBLEMS
 
 PURPOSES = ("sweep", "ars", "ppo")
-"""Purposes of trainings: the sweep of ARS's settings, its models, and those of PPO."""
+"""The sweep of ARS's settings, its models, and those of PPO."""
 
 LEARNERS = {"ars": "ARS", "ppo": "PPO"}
 
 NEAR = 0.2
-"""Distance within which the paper calls a trial near its goal (section 4) [m]."""
+"""Distance within which a trial ends near its goal (section 4) [m]."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Reading:
-    """One way to read what the paper leaves open; the defaults are the literal one.
+    """One reading of what the paper leaves open, by default the literal one.
 
     Parameters
     ----------
     start_spread : float
-        Share of the joint ranges about the home pose from which starts are drawn, in training
-        and in trials.
+        Share of the joint ranges about home from which starts are drawn, in
+        training and trials.
     reward : {"progress", "sign"}
-        Whether a step is rewarded by the metres that it brings the tool closer, or by 1 or -1
+        Reward of a step: the metres that it brings the tool closer, or 1 or -1
         for closer or farther, divided by the horizon.
     sharing : {"none", "pair", "iteration"}
         Which rollouts of an ARS iteration face the same start and goal.
@@ -56,14 +56,14 @@ LITERAL = Reading()
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class PaperRun:
-    """A finished training of the reproduction, and what it came to."""
+    """A finished training of the reproduction."""
 
     planned: Run
     trained: TrainedRun
 
     @property
     def purpose(self) -> str:
-        """One of `PURPOSES`: the first word of its entry in the experiment."""
+        """One of `PURPOSES`: the first word of its entry."""
         return self.planned.entry.name.partition("-")[0]
 
     @property
@@ -89,14 +89,14 @@ class PaperRun:
 
     @property
     def name(self) -> str:
-        """Unique in the reproduction, and fit for a file name."""
+        """Unique, and fit for a file name."""
         setting = "-rate{:g}-perturb{}".format(*self.setting) if self.purpose == "sweep" else ""
         reading = "" if self.reading == LITERAL else f"-{self.reading.name}"
         return f"{self.purpose}{setting}-{self.task}-seed{self.planned.config.seed}{reading}"
 
     @property
     def place(self) -> tuple[float, ...]:
-        """Where it stands among all: by purpose, reading, task, setting and seed."""
+        """Key of the order by purpose, reading, task, setting and seed."""
         reading, (rate, perturbations) = self.reading, self.setting
         return (
             PURPOSES.index(self.purpose),
@@ -116,7 +116,7 @@ class PaperRun:
 
     @property
     def environment_steps(self) -> int:
-        """All that the training took."""
+        """Environment steps of the training."""
         return self.trained.last.environment_steps
 
     @property
@@ -130,15 +130,12 @@ class PaperRun:
         return np.asarray(self.trained.curve_distance, dtype=np.float32)
 
     def steps_to_level(self, distance: float, share: float) -> float:
-        """Environment steps at the first point with a share of trials within a distance [m].
-
-        Infinity if there is no such point.
-        """
+        """Steps until a share of trials ends within a distance [m]; infinity for never."""
         reached = (self.curve_distance <= distance).mean(axis=1) >= share
         return float(self.curve_steps[reached.argmax()]) if reached.any() else float("inf")
 
     def distance_after(self, environment_steps: float) -> NDArray[np.float32]:
-        """Final distances at the last point within a number of steps, or at the first [m]."""
+        """Final distances [m] at the last point within some steps, or at the first."""
         within = int(np.count_nonzero(self.curve_steps <= environment_steps))
         last: NDArray[np.float32] = self.curve_distance[max(within - 1, 0)]
         return last
@@ -162,7 +159,7 @@ class PaperResults:
 
     @property
     def is_judged(self) -> bool:
-        """Whether the trainings are long enough to judge the paper's claims by."""
+        """Whether the trainings are long enough to judge the paper's claims."""
         return self.experiment.name == "reproduction"
 
     @property
@@ -180,7 +177,7 @@ class PaperResults:
         purpose, task : str
             One of `PURPOSES`, and the name of a task; all tasks by default.
         reading : Reading
-            How they read the paper; what does not concern PPO does not count there.
+            How they read the paper; for PPO, only what concerns it.
         """
         if purpose == "ppo":
             reading = Reading(start_spread=reading.start_spread, reward=reading.reward)
@@ -200,8 +197,8 @@ class PaperResults:
     def trial_set(self, task: str, reading: Reading = LITERAL) -> TrialSet:
         """Trials that the final policies faced.
 
-        Those of the paper's tasks are crossed where spread and seed are the same: trial by trial,
-        all tasks have the same start, and goals at the same place of the left or right bench.
+        Under one reading, the paper's tasks are crossed: each trial has the same start, and its
+        goal at the same place of the left or right bench.
         """
         problem = PROBLEMS[task].replace(start_spread=reading.start_spread)
         return trial_set(problem, self.experiment.trials.count, self.experiment.trials.seed)

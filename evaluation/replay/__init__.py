@@ -1,1 +1,1 @@
-"""Replays: finding and choosing trials, recording contestants, following them live."""
+"""Replays: choosing and recording trials, or following them live."""

@@ -1,4 +1,4 @@
-"""Trials to replay: new ones, those of an evaluation, or the recordings of a file."""
+"""Trials to replay: new, of an evaluation, or recordings of a file."""
 
 from collections import Counter
 from collections.abc import Collection, Sequence
@@ -28,22 +28,18 @@ if TYPE_CHECKING:
     from kinarm.evaluation.replay.request import ReplayRequest
 
 PLAYED, SEARCHED, FAILING = 5, 200, 10_000
-"""Trials that are played by default, among which some, and among which failures are looked for."""
+"""Default numbers of trials: to play, to choose from, to look for failures in."""
 
 MOST_FAILURES = 500
-"""Failures that a page holds at most."""
-
+"""Most failures that a page holds."""
 
 Trial = tuple[Recording, ...]
-"""A trial in the hands of one policy, or of two."""
+"""One trial as run by one policy, or by two."""
 
 
 @dataclass(frozen=True)
 class Candidates:
-    """Trials to choose from, and how many of them are played by default.
-
-    Without the set that they are of, nothing else can face them.
-    """
+    """Trials to choose from, how many are played by default, and their set."""
 
     trials: list[Trial]
     played: int
@@ -58,9 +54,9 @@ class Chosen(NamedTuple):
     runs : list
         Recordings of one policy, or of two in the same trials.
     groups : sequence of str
-        What each trial is listed under, if they are in groups.
+        The group of each trial, if any.
     heading : str
-        What the list is of.
+        Heading of the list.
     """
 
     runs: list[list[Recording]]
@@ -69,7 +65,7 @@ class Chosen(NamedTuple):
 
 
 def chosen_recordings(request: "ReplayRequest") -> Chosen:
-    """The recordings that a request asks for, with their bounds; the first policy decides."""
+    """The recordings of a request, with bounds; the first policy decides."""
     candidates = _find_candidates(request)
     trials = candidates.trials
     if request.failures:
@@ -94,30 +90,30 @@ def find_failures(
     trials: int = FAILING,
     seed: int = 0,
 ) -> Chosen:
-    """Record all failures of some policies, and what the oracle does in the same trials.
+    """Record all failures of policies, and the oracle in the same trials.
 
-    They are grouped by recipe and cause, the most frequent cause first. ``kinarm-replay
-    --failures`` shows those of one policy on one problem.
+    They are grouped by recipe and cause, the most frequent cause first.
 
     Parameters
     ----------
     policies : sequence of str
-        As `ReplayRequest` takes them, ``"best"`` included.
+        As `ReplayRequest` takes them.
     problems : sequence of str
         Problems of one arm and scene.
     trials, seed : int
-        Size and seed of the set of trials of each problem.
+        Number of trials of each problem, and their seed.
 
     Returns
     -------
     Chosen
-        For `kinarm.viewer.replay_page`: ``runs``, the recordings of the policies and of the
-        oracle; ``groups`` and ``heading``.
+        For `kinarm.viewer.replay_page`; ``runs`` are those of the policies and
+        of the oracle.
 
     Raises
     ------
     KinarmError
-        If a name or number cannot be used, none fails somewhere, or too many do.
+        If a name or number cannot be used, or too few or too many trials
+        failed.
     """
     found = []
     for policy, problem in product(policies, problems):
@@ -164,8 +160,8 @@ def named_contestants(
 ) -> tuple[list[Contestant], ReachProblem]:
     """The contestants of names, and the problem that they face.
 
-    That is the one that a request names, for the best policy by default the usual one; or what they
-    make of that of the first trained contestant.
+    The request names it (for the best policy, the usual one by default), or
+    changes that of the first trained contestant.
     """
     named = request.problem is not None or request.task is not None
     stated = request.resolve() if named or BEST in names else None
@@ -211,7 +207,7 @@ def _evaluated_candidates(
 
 
 def _check_same(row: Result, recordings: Sequence[Recording]) -> None:
-    """Refuse trials that end otherwise than an evaluation says of a policy."""
+    """Refuse trials that end otherwise than in the evaluation."""
     said = zip(row.outcomes.outcome, row.outcomes.steps, row.outcomes.final_distance, strict=True)
     for each, end in zip(recordings, said, strict=False):
         if (each.outcome, each.steps, each.final_distance) != end:
@@ -222,14 +218,14 @@ def _check_same(row: Result, recordings: Sequence[Recording]) -> None:
 
 
 def _known_contestant(name: str, path: Path) -> Contestant:
-    """The contestant of a name, as long as that does not stand for a file of the user's."""
+    """The contestant of a name that is no user's file."""
     if name in (*UNTRAINED, *policy_names()) or is_import_path(name):
         return _first_contestant(name)
     raise InvalidInputError(f"policy {name!r} of {str(path)!r} is a file: name it with --policy")
 
 
 def _name_in(document: EvaluationDocument, contestant: Contestant) -> str:
-    """Name of a contestant in an evaluation: that of its file alone, or with its folder."""
+    """Name of a contestant in an evaluation, with its folder if needed."""
     names = {row.policy for row in document.results}
     whole = f"{contestant.source.parent.name}/{contestant.name}" if contestant.source else ""
     return whole if whole in names and contestant.name not in names else contestant.name
@@ -238,7 +234,7 @@ def _name_in(document: EvaluationDocument, contestant: Contestant) -> str:
 def _recorded_candidates(
     path: Path, names: Sequence[str | None], problem: str | None, arm: str | None
 ) -> Candidates:
-    """Take recordings from a file; ``arm`` says where the URDF of their arm lies now."""
+    """Take recordings from a file; ``arm`` is where their URDF lies now."""
     found = [each for each in load_recordings(path) if problem in (None, each.problem.name)]
     if arm is not None:
         moved = (each.problem.replace(arm=replace(each.problem.arm, source=arm)) for each in found)
@@ -258,7 +254,7 @@ def _recorded_candidates(
 def _with_bounds(
     candidates: Candidates, chosen: Sequence[Trial], *, oracle: bool
 ) -> list[list[Recording]]:
-    """Recordings of some trials by policy, with their lower bounds if the oracle is asked."""
+    """Recordings by policy, with lower bounds if the oracle is asked."""
     runs = [list(run) for run in zip(*chosen, strict=True)]
     if candidates.faced is None or not oracle:
         return runs
@@ -271,7 +267,7 @@ def _with_bounds(
 
 
 def _failures(candidates: Candidates, *, oracle: bool) -> Chosen:
-    """All trials that failed, in groups by their cause, beside what the oracle does in them."""
+    """All trials that failed, in groups by cause, beside the oracle."""
     first, total = [trial[0] for trial in candidates.trials], len(candidates.trials)
     ends = zip(*((each.outcome, each.steps, each.contact) for each in first), strict=True)
     found = failure_causes(*ends)
@@ -300,13 +296,13 @@ def _check_room(failed: int, total: int, option: str) -> None:
 
 
 def _most_frequent_first(groups: Sequence[str]) -> list[int]:
-    """Order of things by their groups."""
+    """Indices of the groups in order of frequency."""
     frequency = Counter(groups)
     return sorted(range(len(groups)), key=lambda k: (-frequency[groups[k]], groups[k]))
 
 
 def _numbered(trials: Sequence[Trial], wanted: Collection[int]) -> list[Trial]:
-    """Trials of some numbers, in that order."""
+    """Trials of the wanted numbers, in that order."""
     numbers = [first.trial for first, *_ in trials]
     for number in wanted:
         if number not in numbers:
@@ -317,7 +313,7 @@ def _numbered(trials: Sequence[Trial], wanted: Collection[int]) -> list[Trial]:
 
 
 def _worst(trials: Sequence[Trial], count: int) -> list[Trial]:
-    """So many trials that ended farthest from their goals, each number once."""
+    """The trials that ended farthest from their goals, each number once."""
     found: dict[int, Trial] = {}
     for trial in sorted(trials, key=lambda trial: -trial[0].final_distance):
         found.setdefault(trial[0].trial, trial)

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from kinarm.viewer import ReplayPage
 
 ALTERNATIVES = (("policy", "compare"), ("trial", "worst", "collisions", "failures"))
-"""Fields of which one at most can be given."""
+"""Fields that exclude each other."""
 
 NOT_LIVE = (
     *("source", "compare", "trial", "worst", "collisions", "failures", "trials", "out", "record"),
@@ -29,7 +29,7 @@ NOT_FROM_FILE = (
     *("tool_frame", "package_dirs", "task", "scene", "tolerance", "horizon", "start_spread"),
     *("seed", "trials"),
 )
-"""Fields that mean nothing for the live page, and for trials from a file."""
+"""Fields without meaning for the live page, and for trials from a file."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -39,20 +39,22 @@ class ReplayRequest(ProblemOptions):
     Parameters
     ----------
     source : Path
-        File to take trials from: evaluation.json of kinarm-eval, or recordings (.npz).
+        File to take trials from: evaluation.json of kinarm-eval, or recordings
+        (.npz).
     policy : str
-        Shipped policy or recipe (its first seed), best, random, zero, oracle, .npz file, folder of
-        them (the first), Stable-Baselines3's model.zip (runs its code: only if you trust it), or
-        module:function.
+        Shipped policy or recipe (its first seed), best, random, zero, oracle,
+        .npz file, folder of them (the first), Stable-Baselines3's model.zip
+        (runs its code: only if you trust it), or module:function.
     vec_normalize : Path
-        Statistics of VecNormalize for a model of Stable-Baselines3 (runs code), or none; by default
-        those that bear its name.
+        Statistics of VecNormalize for a model of Stable-Baselines3 (runs code),
+        or none; by default those that bear its name.
     compare : tuple of str
         Two policies on the same trials, the second as a ghost.
     trial : tuple of int
         Play this trial; repeatable.
     worst : int
-        Play the trials that ended farthest from their goals, this many; each trial once.
+        Play the trials that ended farthest from their goals, this many; each
+        trial once.
     collisions : bool
         Play the trials that ended in contact.
     failures : bool
@@ -72,7 +74,8 @@ class ReplayRequest(ProblemOptions):
     overwrite : bool
         Replace files that exist.
     live : bool
-        Serve endless fresh trials to the browser of this machine instead of writing a page.
+        Serve endless fresh trials to the browser of this machine instead of
+        writing a page.
     port : int
         Port of --live.
     browser : bool
@@ -147,9 +150,9 @@ class ReplayRequest(ProblemOptions):
         return ["a file" if item.name == "source" else option_name(item) for item in given]
 
     def run(self, report: Callable[[str], object] = lambda _: None) -> "ReplayPage | None":
-        """Write the page, and the recordings if that is asked for, and return it.
+        """Write the page, and the recordings if asked for, and return it.
 
-        Or serve the live page until this is interrupted.
+        Or serve the live page until interrupted.
 
         Parameters
         ----------
@@ -159,7 +162,8 @@ class ReplayRequest(ProblemOptions):
         Raises
         ------
         KinarmError
-            If a file, name or number cannot be used, or a file cannot be written.
+            If a file, name or number cannot be used, or a file cannot be
+            written.
         """
         if self.live:
             self._serve(report)
@@ -167,7 +171,7 @@ class ReplayRequest(ProblemOptions):
         return self._write(report)
 
     def recordings(self) -> "list[list[Recording]]":
-        """Make or read the recordings to play: one list for each policy.
+        """Make or read the recordings to play, a list for each policy.
 
         Raises
         ------

@@ -1,4 +1,4 @@
-"""Recordings of contestants in trials, to keep or to follow on a live page."""
+"""Recordings of contestants, to keep or to follow live."""
 
 import itertools
 import time
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from kinarm.viewer.live_server import LiveServer
 
 SLOWDOWN, REST = 2.5, 1.2
-"""How much slower than the arm the page shows its motion, and the pause between trials [s]."""
+"""Slow motion of the page, and its pause between trials [s]."""
 
 
 def record(
@@ -28,7 +28,7 @@ def record(
     bounds: OracleSolutions | None = None,
     allow_other_arm: bool = False,
 ) -> list[Recording]:
-    """Run a contestant on trials and record its motions, state by state.
+    """Run a contestant on trials and record its motions.
 
     Parameters
     ----------
@@ -39,7 +39,7 @@ def record(
     numbers : sequence of int, optional
         Trials to keep, in this order; all by default.
     bounds : OracleSolutions, optional
-        The oracle's bounds of the trials, or of the first ones, which the replay shows.
+        The oracle's bounds of the trials, or of the first ones.
     allow_other_arm : bool
         Whether a policy may face an arm that it was not trained for.
 
@@ -48,7 +48,7 @@ def record(
     InvalidInputError
         If there is no trial of such a number.
     PolicyFileError
-        If the policy was trained for another arm and that is not allowed.
+        If the policy was trained for another arm, which is not allowed.
     """
     contestant.check(trials.simulator.arm, allow_other_arm=allow_other_arm)
     rollouts = contestant.run(trials, record=True)
@@ -79,7 +79,7 @@ def fresh_recordings(
     contestant, simulator
         Who faces them, and where.
     seed : int
-        That of the first trial; the next ones count up.
+        Seed of the first trial; the next ones count up.
     """
     for number in itertools.count():  # pragma: no branch - it counts without end
         trials = TrialSet.draw(simulator, 1, seed + number)
@@ -90,14 +90,14 @@ def fresh_recordings(
 def follow(
     server: "LiveServer", simulator: Simulator, recordings: Iterable[Recording]
 ) -> Iterator[Recording]:
-    """Show one recording after the other, and hand it out when it is over.
+    """Show one recording after the other, and yield it when it is over.
 
     Parameters
     ----------
     server : LiveServer
         The live page.
     simulator, recordings
-        Where and what was recorded; there may be no end of it.
+        Where and what was recorded, perhaps without end.
     """
     from kinarm.viewer.live_server import LiveStage
 

@@ -1,1 +1,1 @@
-"""The report of an evaluation: one HTML page that needs neither a server nor a network."""
+"""The report of an evaluation: one HTML page that works offline."""

@@ -1,4 +1,4 @@
-"""The card of a policy: what one publishes beside its file."""
+"""The card of a policy, to publish beside its file."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -15,7 +15,7 @@ from kinarm.problem import ReachProblem
 from kinarm.viewer import replay_page
 
 FIRST, WORST = 3, 3
-"""Trials of the replay: the first ones, and those that ended worst."""
+"""Trials of the replay: the first, and the worst."""
 
 
 def check_card(
@@ -48,14 +48,14 @@ def check_card(
 
 
 def write_card(path: Path, document: EvaluationDocument, evaluations: Sequence[Evaluation]) -> None:
-    """Write a card, and the policy and a replay beside it, with the same name.
+    """Write a card, with the policy and a replay beside it.
 
     Parameters
     ----------
     path : Path
         The card, in Markdown; its name ends in .md.
     document : EvaluationDocument
-        What `evaluation_document` made of the evaluations.
+        The document of the evaluations.
     evaluations : sequence of Evaluation
         Those of the policy, and of the oracle if it took part.
     """
@@ -102,7 +102,7 @@ def policy_card(name: str, document: EvaluationDocument, evaluation: Evaluation)
 
 
 def shown_trials(evaluation: Evaluation) -> list[int]:
-    """Trials of the replay: the first, then the worst of the others, failures first."""
+    """The first trials, then the worst others, failures first."""
     rollouts, count = evaluation.rollouts, len(evaluation.trials)
     others = range(min(FIRST, count), count)
     ranked = sorted(others, key=lambda n: (bool(rollouts.success[n]), -rollouts.distance[n]))

@@ -1,7 +1,4 @@
-"""Charts and maps of a problem: what they show; templates draw it.
-
-Maps are of the goal regions from above, to scale, and tell where policies fail.
-"""
+"""What charts and maps of a problem show; templates draw it."""
 
 from collections.abc import Iterable
 from itertools import islice, pairwise
@@ -16,31 +13,31 @@ from kinarm.evaluation.statistics import Estimate, share_over_seeds
 from kinarm.scene import GoalRegion
 
 POINTS = 121
-"""Distances at which a profile is drawn beside those of the table."""
+"""Distances of a profile, beside those of the table."""
 
 SCALE = 200
 """Units of the SVG to a metre."""
 
 MAP_MARGIN, BASE_RADIUS, AXIS_LENGTH = 0.07, 0.1, 0.2
-"""Beside what a map has to show, of the circle for the arm's base, and of the world axes [m]."""
+"""Margin of a map, radius of the arm's base, length of the axes [m]."""
 
 MARKERS = 1000
-"""Trials of which a map shows markers, the first ones; the figures beside them count all."""
+"""Most trials that a map marks, the first ones; its figures count all."""
 
 SLICES = 10
-"""Of a region, along x, whose failures are counted."""
+"""Slices of a region, along x, whose failures are counted."""
 
 DISTANCE_COLOURS = 6
-"""Colours of distances: within the tolerance, and twice the distance from one to the next."""
+"""Colours of distances: within the tolerance, then each for twice the distance."""
 
 
 def profiles(results: ProblemResults) -> tuple[list[float], list[list[Estimate]]]:
-    """Profiles of a problem, the oracle's as well.
+    """Profiles of a problem.
 
     Returns
     -------
     limits, shares : list of float, list of list of Estimate
-        Distances [m], ascending, and the share of trials of each group within each of them.
+        Distances [m], ascending, and each group's share of trials within each.
     """
     furthest = max(float(group.distances.max()) for group in results.groups)
     low, high = results.tolerance / 5, max(furthest, 2 * results.tolerance)
@@ -52,7 +49,7 @@ def profiles(results: ProblemResults) -> tuple[list[float], list[list[Estimate]]
 
 
 def histograms(results: ProblemResults) -> tuple[list[float], list[list[float]]]:
-    """Edges of the bins of final distances [m], and the shares of trials of each group in them."""
+    """Edges of the bins of final distances [m], and each group's shares of trials."""
     furthest = max(float(group.distances.max()) for group in results.groups)
     edges = np.arange(0.0, furthest + 2 * BIN_WIDTH, BIN_WIDTH)
     counts = [np.histogram(group.distances, edges)[0] for group in results.groups]
@@ -61,7 +58,7 @@ def histograms(results: ProblemResults) -> tuple[list[float], list[list[float]]]
 
 
 class View(NamedTuple):
-    """Bounds of a map of the world, seen from above [m]: x points up and y to the left."""
+    """Bounds of a map seen from above [m]: x points up and y to the left."""
 
     x: tuple[float, float]
     y: tuple[float, float]
@@ -76,7 +73,7 @@ class View(NamedTuple):
 
 
 def worst_outcomes(group: Group) -> list[str]:
-    """Outcome of each trial: contact if any training seed had it, success if all had."""
+    """Outcome of each trial: contact if any seed had it, success if all had."""
     collision = np.any([member.rollouts.collision for member in group.members], axis=0)
     success = np.where(group.success.all(axis=0), "success", "truncated")
     outcomes: list[str] = np.where(collision, "collision", success).tolist()
@@ -91,7 +88,7 @@ def level(distance: float, tolerance: float) -> int:
 
 
 class Marker(NamedTuple):
-    """The goal of a trial: mean distance [m], outcome and how many training seeds reached it."""
+    """A goal: mean distance [m], outcome, and how many seeds reached it."""
 
     trial: int
     goal: list[float]
@@ -112,7 +109,7 @@ def markers(group: Group) -> list[Marker]:
 def failure_shares(
     group: Group, region: GoalRegion
 ) -> list[tuple[tuple[float, float], float | None]]:
-    """Share of trials that did not succeed, in slices of a region along x, all seeds alike.
+    """Share of trials that failed, over all seeds, in slices of a region along x.
 
     Each with the ends of its slice [m], ascending; None where no goal lies.
     """

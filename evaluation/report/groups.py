@@ -1,4 +1,4 @@
-"""What a page shows as one: a policy, or all training seeds of a recipe; and its worst trials."""
+"""Groups of a report, a policy or training seeds each, and worst trials."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -20,21 +20,20 @@ from kinarm.recording import Recording
 from kinarm.scene import GoalRegion
 
 PAGE_COLOURS, PAGE_DASHES = 6, 4
-"""Colours of the style sheet for policies; beyond them, lines are dashed."""
+"""Colours and dashes of the style sheet for policies."""
 
 UNTRAINED_ALGORITHMS = ("baseline", "oracle")
-"""Algorithms of the contestants that policies are compared with."""
-
+"""Algorithms of contestants that are no policies."""
 
 BEST_GROUPS, TRIALS, AT_LEAST = 4, 9, 3
-"""Groups of a problem whose worst trials are shown, trials that they share, and the least each."""
+"""Groups with worst trials, trials that they share, and the least each."""
 
 
 @dataclass(frozen=True, eq=False)
 class Group:
-    """A row of the table, the evaluations behind it, one per training seed, and its style.
+    """A row of the table, its evaluations by training seed, and its style.
 
-    The style is the classes of the style sheet that give it its colour and dash.
+    The style names classes of the style sheet.
     """
 
     row: Row
@@ -64,7 +63,7 @@ class Group:
 
 @dataclass(frozen=True, eq=False)
 class ProblemResults:
-    """A problem, what the document's protocol says about it, and its groups as in the table."""
+    """A problem, its entry in the protocol, and its groups as in the table."""
 
     name: str
     entry: FacedProblem
@@ -82,7 +81,7 @@ class ProblemResults:
 
     @property
     def oracle_rate(self) -> float | None:
-        """Share of the trials that the oracle solved, if it was asked."""
+        """Share of trials that the oracle solved, if asked."""
         return self.entry.oracle.success.value if self.entry.oracle else None
 
     @property
@@ -93,7 +92,7 @@ class ProblemResults:
 
     @property
     def contenders(self) -> tuple[Group, ...]:
-        """The policies, best first; where there are none, the baselines; else the oracle."""
+        """The policies, best first; without any, the baselines; else the oracle."""
         policies = tuple(group for group in self.groups if group.is_policy)
         others = tuple(group for group in self.groups if group.row.algorithm != "oracle")
         return policies or others or self.groups
@@ -102,7 +101,7 @@ class ProblemResults:
 def group_results(
     document: EvaluationDocument, evaluations: Sequence[Evaluation]
 ) -> tuple[ProblemResults, ...]:
-    """Bring the rows of the table together with the evaluations behind them."""
+    """Bring the rows of the table together with their evaluations."""
     known = {(each.contestant.name, each.problem.name): each for each in evaluations}
     if list(known) != [(row.policy, row.problem) for row in document.results]:
         raise InvalidInputError("a report needs the document of the very evaluations that it shows")
@@ -120,7 +119,7 @@ def group_results(
 
 
 def _styles(labels: Sequence[str], evaluations: Sequence[Evaluation]) -> dict[str, str]:
-    """Classes by what the seeds and problems of a recipe share, in the order of appearance."""
+    """Classes by label, in the order of appearance."""
     contestants = {label: each.contestant for label, each in zip(labels, evaluations, strict=True)}
     styles = {label: f"reference {each.name}" for label, each in contestants.items()}
     trained = (k for k, each in contestants.items() if each.algorithm not in UNTRAINED_ALGORITHMS)
@@ -131,7 +130,7 @@ def _styles(labels: Sequence[str], evaluations: Sequence[Evaluation]) -> dict[st
 
 
 class WorstTrial(NamedTuple):
-    """A trial that went badly: whose it was, of which training seed, and its number."""
+    """A bad trial: its group, its training seed's evaluation, and its number."""
 
     group: Group
     evaluation: Evaluation
@@ -139,9 +138,9 @@ class WorstTrial(NamedTuple):
 
 
 def worst_trials(results: ProblemResults) -> tuple[WorstTrial, ...]:
-    """The worst trials of the best groups of a problem: failures first, the farthest first.
+    """The worst trials of a problem's best groups: failures first, the farthest first.
 
-    No trial is there twice: that of a better group, which has fewer failures, goes first.
+    No trial is there twice: a better group, which has fewer failures, chooses first.
     """
     groups = results.contenders[:BEST_GROUPS]
     share = max(AT_LEAST, TRIALS // len(groups))
@@ -153,7 +152,7 @@ def worst_trials(results: ProblemResults) -> tuple[WorstTrial, ...]:
 
 
 def _ranked(group: Group) -> list[WorstTrial]:
-    """Each trial of a group by the training seed that does worst in it, the worst first."""
+    """Each trial of a group by its worst training seed, the worst first."""
     order = np.lexsort((-group.distances.ravel(), group.success.ravel())).tolist()
     found: dict[int, WorstTrial] = {}
     for place in order:
@@ -163,7 +162,7 @@ def _ranked(group: Group) -> list[WorstTrial]:
 
 
 def record_worst(chosen: Sequence[WorstTrial]) -> list[Recording]:
-    """Run policies on the trials again: one recording for each."""
+    """Run the trials again, and record each."""
     recordings = {}
     for each in dict.fromkeys(worst.evaluation for worst in chosen):
         trials = [worst.trial for worst in chosen if worst.evaluation is each]

@@ -25,12 +25,12 @@ from kinarm.viewer import replay_page
 def write_report(
     folder: str | Path, document: EvaluationDocument, evaluations: Sequence[Evaluation]
 ) -> Path:
-    """Write the report of an evaluation as ``index.html``, and return its path.
+    """Write the report as ``index.html``, and return its path.
 
     Parameters
     ----------
     folder : str or Path
-        Where to; it is created if it is missing.
+        Where to; it is created if missing.
     document, evaluations
         As for `report_page`.
 
@@ -48,8 +48,8 @@ def write_report(
 def report_page(document: EvaluationDocument, evaluations: Sequence[Evaluation]) -> str:
     """The report of an evaluation: one HTML page that fetches nothing.
 
-    It holds the table with its intervals drawn, performance profiles, histograms, maps of the
-    benches, the worst trials and how everything was made. Equal input gives equal text.
+    It holds the table, profiles, histograms, maps of the benches, the worst
+    trials and how everything was made. Equal input gives equal text.
 
     Parameters
     ----------
@@ -61,7 +61,7 @@ def report_page(document: EvaluationDocument, evaluations: Sequence[Evaluation])
     Raises
     ------
     InvalidInputError
-        If the document was made of others, or two of them cannot be told apart.
+        If the document is of others, or two of them cannot be told apart.
     """
     problems = group_results(document, evaluations)
     chosen = [worst_trials(results) for results in problems]

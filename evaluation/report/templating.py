@@ -9,7 +9,7 @@ if TYPE_CHECKING:
 
 
 def template_environment(**settings: Any) -> "Environment":
-    """Jinja's ``Environment`` with these settings, for the templates of all pages."""
+    """Jinja's ``Environment`` for all templates, with these settings."""
     from jinja2 import Environment, PackageLoader, StrictUndefined
 
     environment = Environment(

@@ -163,9 +163,11 @@ class ReachGoalEnv(GoalEnvironment, ReachEnv):
     problem : ReachProblem, str or Path
         As for `ReachEnv`.
     reward_type : {"sparse", "dense"}
-        -1 for each step but 0 for one that reaches the goal, or minus the distance [m].
+        -1 for each step but 0 for one that reaches the goal, or minus the
+        distance [m].
     **settings
-        As for `ReachEnv`; only ``collision`` of the problem's own reward has an effect.
+        As for `ReachEnv`; only ``collision`` of the problem's own reward has an
+        effect.
 
     Notes
     -----
@@ -174,18 +176,20 @@ class ReachGoalEnv(GoalEnvironment, ReachEnv):
     arms of six joints); ``achieved_goal``, the tool point x, y, z [m]; ``desired_goal``, the goal
     x, y, z [m].
 
-    **Reward**: that of the reward type, and the problem's ``collision`` (-1 by default) if a
-    move was refused. ``compute_reward(achieved_goal, desired_goal, info)`` returns it for one or
-    many pairs of goals, from these and ``info["collision"]`` only; ``compute_terminated`` and
+    **Reward**: that of the reward type, and the problem's ``collision`` (-1 by
+    default) if a move was refused. ``compute_reward(achieved_goal,
+    desired_goal, info)`` returns it for one or many pairs of goals, from these
+    and ``info["collision"]`` only; ``compute_terminated`` and
     ``compute_truncated`` depend on the goals.
 
-    **End**: terminated when the tool is within the tolerance of the goal; truncated at the
-    horizon. A move that would touch something is refused, the arm stays, and the episode goes on:
-    an end by contact would not follow from the goals, and would reward giving up.
-    ``kinarm-eval`` goes by the rules of `ReachEnv`, where contact ends an episode.
+    **End**: terminated when the tool is within the tolerance of the goal;
+    truncated at the horizon. A move that would touch something is refused, the
+    arm stays, and the episode goes on: an end by contact would not follow from
+    the goals, and would reward giving up. ``kinarm-eval`` goes by the rules of
+    `ReachEnv`, where contact ends an episode.
 
-    **Info**: that of `ReachEnv`, without reward terms; ``collision`` and ``contact`` are about
-    the last step.
+    **Info**: that of `ReachEnv`, without reward terms; ``collision`` and
+    ``contact`` are about the last step.
 
     **Versions**: v0, the first.
     """

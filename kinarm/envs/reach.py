@@ -23,8 +23,9 @@ class ReachEnv(ArmEnvironment, gymnasium.Env[Any, Array]):
     problem : ReachProblem, str or Path
         ``"left"``, ``"right"``, ``"both"``, a problem file, or a problem.
     render_mode : {"rgb_array", "human"}, optional
-        What `render` returns: a picture, or nothing, while a browser's page follows the arm. Films,
-        by Gymnasium's ``RecordVideo``, need the extra ``render``.
+        What `render` returns: a picture, or nothing, while a browser's page
+        follows the arm. Films, by Gymnasium's ``RecordVideo``, need the extra
+        ``render``.
     width, height : int
         Size of pictures [pixels].
     camera : kinarm.viewer.Camera, optional
@@ -32,8 +33,9 @@ class ReachEnv(ArmEnvironment, gymnasium.Env[Any, Array]):
     observation_dtype : {"float64", "float32"}
         Type of observations.
     **overrides
-        What `kinarm.ReachProblem.replace` takes, such as ``arm``, ``tolerance``, ``horizon``,
-        ``start_spread``, or ``reward={"success": 1.0}``.
+        What `kinarm.ReachProblem.replace` takes, such as ``arm``,
+        ``tolerance``, ``horizon``, ``start_spread``, or ``reward={"success":
+        1.0}``.
 
     Notes
     -----
@@ -42,7 +44,8 @@ class ReachEnv(ArmEnvironment, gymnasium.Env[Any, Array]):
     of the default arm move 7, 7, 8, 9 and 9 degrees a step. Larger actions are clipped; float64 is
     not rounded.
 
-    **Observation** (6 + 7 joints, 48 for the shipped arms), world frame with z up:
+    **Observation** (6 + 7 joints, 48 for the shipped arms), world frame with z
+    up:
 
     ===== ====================================================== ====
     Index Meaning                                                Unit
@@ -55,22 +58,26 @@ class ReachEnv(ArmEnvironment, gymnasium.Env[Any, Array]):
 
     Quaternions are composed along the chain, so they do not flip signs.
 
-    **Reward**: sum of the terms ``reward_progress`` (metres by which the tool came closer),
-    ``reward_closer`` (0, for every step closer), ``reward_step`` (0), ``reward_collision`` (-1
-    when a move touches something) and ``reward_success`` (0), with the default weights in
-    brackets; see `kinarm.RewardWeights`.
+    **Reward**: sum of the terms ``reward_progress`` (metres by which the tool
+    came closer), ``reward_closer`` (0, for every step closer), ``reward_step``
+    (0), ``reward_collision`` (-1 when a move touches something) and
+    ``reward_success`` (0), with the default weights in brackets; see
+    `kinarm.RewardWeights`.
 
-    **Start**: each actuated joint uniform within its limits, until the arm touches nothing and the
-    tool is farther from the goal than the tolerance. Goals are uniform over the task's regions.
-    ``reset(options={"start": q, "goal": p})`` sets either.
+    **Start**: each actuated joint uniform within its limits, until the arm
+    touches nothing and the tool is farther from the goal than the tolerance.
+    Goals are uniform over the task's regions. ``reset(options={"start": q,
+    "goal": p})`` sets either.
 
-    **End**: terminated when the tool is within 0.05 m of the goal, or when a move would touch the
-    ground, an obstacle or the arm itself (the move is refused); truncated after 64 steps. Then
-    nothing moves until `reset`: steps have the reward 0, and Gymnasium warns.
+    **End**: terminated when the tool is within 0.05 m of the goal, or when a
+    move would touch the ground, an obstacle or the arm itself (the move is
+    refused); truncated after 64 steps. Then nothing moves until `reset`: steps
+    have the reward 0, and Gymnasium warns.
 
-    **Info**: ``distance`` [m]; and after a step ``success`` and, the same, ``is_success``;
-    ``collision``; ``contact``, the number of the two bodies that would have touched, whose names
-    are ``contact_names[contact]``, or 0; and the five reward terms.
+    **Info**: ``distance`` [m]; and after a step ``success`` and, the same,
+    ``is_success``; ``collision``; ``contact``, the number of the two bodies
+    that would have touched, whose names are ``contact_names[contact]``, or 0;
+    and the five reward terms.
 
     **Versions**: v0, the first.
     """

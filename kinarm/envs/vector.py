@@ -18,8 +18,8 @@ from kinarm.problem import ProblemLike
 class ReachVectorEnv(ArmEnvironment, VectorEnv[Any, Array, NDArray[Any]]):
     """A native batch of `ReachEnv`, stepped by one call of the compiled simulator.
 
-    Sub-environment i behaves like a `ReachEnv` reset with ``seed + i``. Spaces, rewards, ends and
-    infos are those of `ReachEnv`, batched as in Gymnasium.
+    Sub-environment i behaves like a `ReachEnv` reset with ``seed + i``. Spaces,
+    rewards, ends and infos are those of `ReachEnv`, batched as in Gymnasium.
 
     Parameters
     ----------
@@ -28,10 +28,11 @@ class ReachVectorEnv(ArmEnvironment, VectorEnv[Any, Array, NDArray[Any]]):
     problem : ReachProblem, str or Path
         As for `ReachEnv`.
     autoreset_mode : AutoresetMode or str
-        ``NextStep`` (default, as in Gymnasium): the step after an episode's end begins the next one
-        and ignores its action. ``SameStep``: a finished episode is replaced at once; its last
-        observation and info are in ``final_obs`` and ``final_info``. ``Disabled``: an arm rests
-        until ``reset(options={"reset_mask": mask})``.
+        ``NextStep`` (default, as in Gymnasium): the step after an episode's end
+        begins the next one and ignores its action. ``SameStep``: a finished
+        episode is replaced at once; its last observation and info are in
+        ``final_obs`` and ``final_info``. ``Disabled``: an arm rests until
+        ``reset(options={"reset_mask": mask})``.
     threads : int, optional
         As for `kinarm.Simulator`.
     render_mode, width, height, camera, observation_dtype

@@ -1,7 +1,7 @@
 """Compiled kernels: whole episodes, each step proven free of contact or left to Coal.
 
-Kernels that Python calls document their parameters. Their helpers (`inlined`, `helper`) share these
-arguments and the names of their fields:
+Kernels that Python calls document their parameters. Their helpers (`inlined`,
+`helper`) share these arguments and the names of their fields:
 
 chain, shapes, rules, control, episodes
     `Chain`, `ContactShapes`, `Rules`, `Control` and `Episodes`.

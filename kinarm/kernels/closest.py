@@ -38,7 +38,8 @@ class Bodies(NamedTuple):
     corners : ndarray, shape (n_corners, 3)
         Corners in the joint frame [m]; of a half-space, its outer normal.
     rounding : ndarray, shape (n,)
-        Radius that widens the hull of the corners [m]; of a half-space, its offset.
+        Radius that widens the hull of the corners [m]; of a half-space, its
+        offset.
     flat : ndarray of bool, shape (n,)
         Whether it is a half-space.
     exact : ndarray of bool, shape (n,)
@@ -175,9 +176,11 @@ def closest_pairs(
     configurations : ndarray, shape (n, n_joints)
         Joint positions [rad or m].
     bounds : ndarray, shape (n, n_pairs)
-        Where lower bounds of distances go; that of the closest pair is its distance [m].
+        Where lower bounds of distances go; that of the closest pair is its
+        distance [m].
     nearest : ndarray of int, shape (n,)
-        Where the closest pair goes; -1 if polytopes overlap or differ from the shapes.
+        Where the closest pair goes; -1 if polytopes overlap or differ from the
+        shapes.
     points : ndarray, shape (n, 2, 3)
         Where its two closest points go [m].
     """

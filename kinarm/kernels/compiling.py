@@ -1,8 +1,8 @@
 """How kernels are compiled: without the GIL and without reordering of floating-point operations.
 
-Numba makes machine code of every function, though helpers reach kernels as LLVM code and are
-optimised there again. Here helpers are only simplified before they are linked. Only this module,
-`records` and `lanes` use Numba's internals.
+Numba makes machine code of every function, though helpers reach kernels as LLVM
+code and are optimised there again. Here helpers are only simplified before they
+are linked. Only this module, `records` and `lanes` use Numba's internals.
 
 Numba trusts cached machine code as long as a kernel's own file is unchanged. Here the key is a hash
 of all files whose helpers and constants are compiled in.
@@ -98,8 +98,9 @@ WITHOUT = {
     "InlineOverloads",
     "NopythonRewrites",
 }
-"""Passes of Numba for what kernels lack, such as contexts, closures, error messages, literals and
-expressions of whole arrays. They take a twelfth of the time."""
+"""Passes of Numba for what kernels lack, such as contexts, closures, error
+messages, literals and expressions of whole arrays. They take a twelfth of the
+time."""
 
 
 class LeanLibrary(JITCodeLibrary):

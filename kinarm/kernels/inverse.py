@@ -45,11 +45,13 @@ class Search(NamedTuple):
     tool : ndarray, shape (3,)
         Tool point in the last joint frame [m].
     axes : ndarray, shape (n_axes, 3)
-        Unit vectors of the last joint frame whose directions are wanted; none, one or three.
+        Unit vectors of the last joint frame whose directions are wanted; none,
+        one or three.
     scale : float
         Inverse of the arm's reach [1/m].
     near : ndarray, shape (n_joints,)
-        First seed, where other joints rest and to which whole turns are closest.
+        First seed, where other joints rest and to which whole turns are
+        closest.
     seeds : ndarray, shape (n_seeds, n)
         Further seeds between the limits of the first n joints, from 0 to 1.
     least : int
@@ -190,7 +192,8 @@ def solve_targets(
 ) -> None:
     """Find the configurations of wanted tools, for rows of targets.
 
-    Of solutions that differ by whole turns, the nearest to ``search.near`` is given.
+    Of solutions that differ by whole turns, the nearest to ``search.near`` is
+    given.
 
     Parameters
     ----------

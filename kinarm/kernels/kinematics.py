@@ -134,11 +134,13 @@ def follow_frame(
     first, last, chain
         Range of the rows, and the arm.
     joint, placement : int and ndarray, shape (4, 4)
-        The frame's joint, 0 for the world, and its place in the joint's frame [m].
+        The frame's joint, 0 for the world, and its place in the joint's frame
+        [m].
     configurations : ndarray, shape (n, n_joints)
         Joint positions [rad or m].
     filled : ndarray, shape (n, 4, 4) or (n, 6, n_joints)
-        Where its poses in the world go [m], or its Jacobians, up to the joint of the frame.
+        Where its poses in the world go [m], or its Jacobians, up to the joint
+        of the frame.
     """
     poses = np.zeros((configurations.shape[1] + 1, POSE))
     for row in range(first, last):

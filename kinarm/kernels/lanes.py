@@ -22,8 +22,8 @@ LANES = 8
 """Episodes in a value: doubles of the widest vector registers."""
 
 FIRST = {"target": "cpu"}
-"""Makes Numba try an operator on lanes before others: it asks what is specific to a target
-first."""
+"""Makes Numba try an operator on lanes before others: it asks what is specific
+to a target first."""
 
 NUMBERS = ir.VectorType(ir.DoubleType(), LANES)
 BITS = ir.VectorType(ir.IntType(1), LANES)

@@ -1,11 +1,13 @@
 """Separating planes between two bodies, for a number or lanes.
 
-A rounded polytope, the hull of a few corners widened by a radius, encloses each body. A pair's
-plane lies above its first body, the carrier, and moves with it; the least height of the second, the
-mover, above it bounds their distance from below. The ground's plane is its surface.
+A rounded polytope, the hull of a few corners widened by a radius, encloses each
+body. A pair's plane lies above its first body, the carrier, and moves with it;
+the least height of the second, the mover, above it bounds their distance from
+below. The ground's plane is its surface.
 
-A plane has five entries: unit normal x, y, z in the joint frame that carries it, offset along
-the normal, and the mover's least height when last asked for [m].
+A plane has five entries: unit normal x, y, z in the joint frame that carries
+it, offset along the normal, and the mover's least height when last asked for
+[m].
 
 The best plane follows from the distance algorithm of Gilbert, Johnson and Keerthi. In the carrier's
 frame it looks for the point closest to the origin of all differences of points of mover and

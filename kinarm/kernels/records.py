@@ -130,7 +130,8 @@ class Layout:
     name : str
         Name of the type.
     shapes : mapping
-        Type of entries, `lanes`, float64 or int64, and shape of each array; lengths may be `Fixed`.
+        Type of entries, `lanes`, float64 or int64, and shape of each array;
+        lengths may be `Fixed`.
     """
 
     def __init__(self, name: str, shapes: Shapes) -> None:

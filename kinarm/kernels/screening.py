@@ -28,7 +28,8 @@ def propose_starts(
     rows, uniforms : ndarray, of int, shape (n_rows,), and (n_rows, n_actuated)
         Which starts, and numbers in [0, 1).
     lower, extent, starts : ndarray, shape (n_joints,), twice, and (n, n_joints)
-        Lower ends and widths of the ranges, and all starts, changed in place [rad or m].
+        Lower ends and widths of the ranges, and all starts, changed in place
+        [rad or m].
     """
     for i in range(rows.shape[0]):
         for joint in range(uniforms.shape[1]):

@@ -43,7 +43,8 @@ def layouts(
 ) -> tuple[Layout, Layout]:
     """Layouts of a block and of a single episode's space.
 
-    `kinarm.kernels.lanes.as_numbers` gives arrays of lanes one axis more, of the episodes.
+    `kinarm.kernels.lanes.as_numbers` gives arrays of lanes one axis more, of
+    the episodes.
 
     Parameters
     ----------

@@ -14,8 +14,8 @@ from kinarm.scene import Scene
 
 FIELD_OF_VIEW = 30.0
 TARGET, EYE = (0.05, 0.1, 0.38), (-2.42, 1.9, 1.5)
-"""Middle of the picture, and the camera relative to it, if goals lie on the left [m]: as on the
-replay page, but with room for an upright arm."""
+"""Middle of the picture, and the camera relative to it, if goals lie on the
+left [m]: as on the replay page, but with room for an upright arm."""
 
 NEAR, FAR = 1.0, 1.45
 """Stages of a radius between these are seen from there; others scale that [m]."""

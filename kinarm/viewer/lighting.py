@@ -174,8 +174,8 @@ def light_up(
 ) -> Vector:
     """Light that a surface sends to the eye: red, green and blue, linear.
 
-    The room's light follows Karis' fit of what a rough surface mirrors, and Fdez-Aguera's of what
-    it mirrors repeatedly.
+    The room's light follows Karis' fit of what a rough surface mirrors, and
+    Fdez-Aguera's of what it mirrors repeatedly.
 
     Parameters
     ----------

@@ -73,7 +73,8 @@ def page_html(
     Parameters
     ----------
     template, title
-        Name of the template, which extends ``page.html``, and of its style; the page's title.
+        Name of the template, which extends ``page.html``, and of its style; the
+        page's title.
     scene : bytes
         Framed commands to Meshcat's viewer.
     data : mapping
@@ -154,9 +155,11 @@ def replay_page(
     path : str or Path, optional
         File of the page, if it is to be written.
     ghosts : sequence of Recording
-        Recordings of another policy in the same trials, shown in the same scene.
+        Recordings of another policy in the same trials, shown in the same
+        scene.
     groups : sequence of str
-        Group of each recording in a list of trials; groups stay together. By default no list.
+        Group of each recording in a list of trials; groups stay together. By
+        default no list.
     heading : str
         Heading of the list.
 
@@ -291,13 +294,15 @@ def arm_page(
 ) -> ArmPage:
     """Make a page with a slider for each joint of an arm, which shows contact.
 
-    In the browser, the page tests the same pairs of shapes as the simulator. Its verdicts are
-    Coal's, except for shapes that are less than 1e-6 m from touching.
+    In the browser, the page tests the same pairs of shapes as the simulator.
+    Its verdicts are Coal's, except for shapes that are less than 1e-6 m from
+    touching.
 
     Parameters
     ----------
     arm : Arm, ArmSpecification, str or Path
-        The arm where it stands, or for `kinarm.Arm.load`, mounted as in the scene.
+        The arm where it stands, or for `kinarm.Arm.load`, mounted as in the
+        scene.
     path : str or Path, optional
         File of the page, if it is to be written.
     scene : Scene

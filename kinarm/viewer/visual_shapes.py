@@ -66,8 +66,8 @@ UNIVERSAL_ROBOTS = np.array(
 """Colours of the maker's caps, links, joints, rims and seals."""
 
 DIMMING, MOST_TIMES, SAME_COLOUR = 0.8, 6, 0.003
-"""The meshes in ``ur_description`` went through a modeller, some more often than others, which each
-time left them this share of their light."""
+"""The meshes in ``ur_description`` went through a modeller, some more often
+than others, which each time left them this share of their light."""
 
 
 class PaintedMesh(NamedTuple):
@@ -163,7 +163,8 @@ def link_joints(arm: Arm) -> dict[str, int]:
 def visual_parts(arm: Arm) -> Iterator[ArmPart]:
     """Visual shapes of an arm's URDF, simplified where they are meshes.
 
-    A mesh of several colours keeps them; else the URDF's colour takes precedence.
+    A mesh of several colours keeps them; else the URDF's colour takes
+    precedence.
 
     Raises
     ------
@@ -227,8 +228,9 @@ def _numbers(element: Element, name: str, where: str = "a visual shape") -> tupl
 def read_mesh_file(path: Path, scale: Sequence[float]) -> tuple[PaintedMesh, ...]:
     """Read a mesh file and simplify it, or look it up in the cache.
 
-    Nodes are placed and units converted as the file says, without its up axis, as in ROS and
-    Pinocchio, so that looks and collision shapes agree. ``scale`` are factors along the axes.
+    Nodes are placed and units converted as the file says, without its up axis,
+    as in ROS and Pinocchio, so that looks and collision shapes agree. ``scale``
+    are factors along the axes.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Augmented Random Search: its settings, the state of a training, and itself as a learner."""
+"""Augmented Random Search: settings, state of a training, and learner."""
 
 from dataclasses import dataclass, field
 from typing import Any, Literal
@@ -7,17 +7,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kinarm._fields import OPTIONAL
-from kinarm.errors import InvalidInputError
+from kinarm.errors import POSITIVE, SHARE, InvalidInputError
 from kinarm.failed_scenarios import LARGEST_REPLAY, FailedScenarios
-from kinarm.policies.config import (
-    MANY,
-    POSITIVE,
-    SHARE,
-    WIDTHS,
-    Schedule,
-    TrainingConfig,
-    scheduled,
-)
+from kinarm.policies.config import MANY, WIDTHS, Schedule, TrainingConfig, scheduled
 from kinarm.policies.learners import TrainingState, imported
 from kinarm.policies.normalizer import Normalizer
 from kinarm.policies.recipes import shipped_learner
@@ -27,7 +19,7 @@ Sharing = Literal["none", "pair", "iteration"]
 
 @dataclass(frozen=True, kw_only=True)
 class ARSConfig(TrainingConfig):
-    """Settings of a training; the defaults are the paper's Table 1, that is, ARS V2-t.
+    """Settings of a training; by default ARS V2-t as in the paper's Table 1.
 
     Parameters
     ----------
@@ -40,31 +32,33 @@ class ARSConfig(TrainingConfig):
     noise : float
         Standard deviation nu of the perturbations.
     directions : int
-        Perturbations N per iteration, each tried with both signs.
+        Perturbations N per iteration, each with both signs.
     top_directions : int
-        Perturbations b that enter the update, those with the best returns; b = N is V1 or V2.
+        Perturbations b that enter the update, the best ones; b = N is V1 or V2.
     symmetric : bool
-        Whether the policy treats mirror images alike, if arm and obstacles are their own mirror
-        image; it then learns from goals on the right and from mirror images of those on the left.
+        Whether the policy treats mirror images alike, if arm and obstacles are
+        symmetric; it then learns from goals on the right and mirror images of
+        others.
     net_arch : tuple of int
-        Widths of hidden layers with tanh; the policy is linear if there are none.
+        Widths of hidden layers with tanh; without any, the policy is linear.
     normalize : bool
         Whether observations are normalised (V2) or not (BRS, V1).
     scale_by_deviation : bool
-        Whether the step is divided by the standard deviation of the returns (ARS) or not (BRS).
+        Whether the step is divided by the standard deviation of the returns
+        (ARS) or not (BRS).
     sharing : {"none", "pair", "iteration"}
-        Which policies face the same starts and goals: none (every episode draws its own), the two
-        signs of a perturbation, or all perturbations of an iteration.
+        Which policies face the same starts and goals: none, the two signs of a
+        perturbation, or all of an iteration.
     episodes : int
         Episodes whose mean return judges a perturbed policy.
     replay_share : float
-        Probability that a scenario is replayed, after at least half of the policies failed in it;
-        see `kinarm.failed_scenarios`.
+        Probability of replaying a scenario that half of its policies or more
+        failed; see `kinarm.failed_scenarios`.
     replay_size : int
         Failed scenarios that are kept.
     initial_policy : str, optional
-        Name or file of a policy that the training begins with; it must have the same layers, and
-        may be for another problem or arm.
+        Name or file of a policy to begin with; it must have the same layers,
+        and may be for another problem or arm.
     """
 
     iterations: int = 800
@@ -88,14 +82,14 @@ class ARSConfig(TrainingConfig):
     def __post_init__(self) -> None:
         super().__post_init__()
         if self.top_directions > self.directions:
-            limit, given = self.directions, self.top_directions
             raise InvalidInputError(
-                f"top_directions must be at most directions ({limit}), got {given}"
+                f"top_directions must be at most directions ({self.directions}), "
+                f"got {self.top_directions}"
             )
 
     @property
     def can_extend(self) -> bool:
-        """Whether a training with more iterations begins just as this one goes."""
+        """Whether a longer training begins just as this one goes."""
         return self.step_size_schedule == "constant"
 
     def step_size_at(self, iteration: int) -> float:
@@ -104,7 +98,7 @@ class ARSConfig(TrainingConfig):
 
 
 _PROBE: np.random.BitGenerator = np.random.PCG64(0)
-"""Refuses what is no state of a generator."""
+"""Refuses invalid states of a generator."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -114,7 +108,7 @@ class ARSState(TrainingState):
     Parameters
     ----------
     theta : ndarray, shape (n_actions, n_observations) or (1, n_parameters)
-        Parameters of a linear policy, or of a network as `kinarm.Networks` keeps them.
+        Parameters of a linear policy, or of a network as in `kinarm.Networks`.
     normalizer : Normalizer
         Statistics mu and Sigma of the observations.
     generator : dict

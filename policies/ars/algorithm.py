@@ -33,7 +33,7 @@ from kinarm.simulator import Simulator
 class ARSTraining:
     """A training under way; all that changes is in the `ARSState`.
 
-    The result does not depend on the simulator's number of threads.
+    The result does not depend on the number of threads.
     """
 
     def __init__(self, config: ARSConfig, threads: int | None = None) -> None:
@@ -43,7 +43,7 @@ class ARSTraining:
         self._rng = stream_generator(Stream.ARS, config.seed)
 
     def initial_state(self) -> ARSState:
-        """State before the first iteration: mu = 0, Sigma = I, and theta = 0 if it is linear."""
+        """First state: mu = 0, Sigma = I, and theta = 0 if it is linear."""
         n_observations, *_, n_actions = self._widths
         rng = stream_generator(Stream.ARS, self.config.seed)
         normalizer = Normalizer.empty(n_observations)
@@ -67,8 +67,7 @@ class ARSTraining:
     def iterate(self, state: ARSState) -> ARSState:
         """One pass through the loop of Algorithm 1.
 
-        The statistics are frozen within it: they are updated at its end with all observations of
-        its episodes.
+        Statistics are frozen within it, and updated at its end with all observations.
         """
         began, config, simulator = time.perf_counter(), self.config, self.simulator
         rng, N = self._rng, config.directions
@@ -106,9 +105,9 @@ class ARSTraining:
 
 
 class Scenarios(NamedTuple):
-    """Starts and goals of an iteration, which of them were failed before, and how often each comes.
+    """Starts and goals of an iteration, which are replayed, and copies of each.
 
-    All of them, repeated, are those of the episodes in the order sign, direction, episode.
+    Repeated, they are those of the episodes in the order sign, direction, episode.
     """
 
     starts: Array
@@ -122,7 +121,7 @@ class Scenarios(NamedTuple):
         return np.tile(self.starts, (self.copies, 1)), np.tile(self.goals, (self.copies, 1))
 
     def outcome_of_new(self, rollouts: Rollouts) -> tuple[float, float, float]:
-        """Mean and deviation of the returns of new scenarios, and share of success; or NaN."""
+        """Mean and deviation of returns in new scenarios, and success; or NaN."""
         new = np.tile(~self.replayed, self.copies)
         if not new.any():
             return math.nan, math.nan, math.nan
@@ -130,7 +129,7 @@ class Scenarios(NamedTuple):
         return *mean_and_deviation(returns), int(np.count_nonzero(success)) / len(success)
 
     def missed(self, rollouts: Rollouts) -> StartsAndGoals:
-        """Those that at least half of the policies that faced them failed."""
+        """Those that at least half of their policies failed."""
         reached = np.count_nonzero(rollouts.success.reshape(self.copies, -1), axis=0)
         missed = 2 * reached <= self.copies
         return self.starts[missed], self.goals[missed]
@@ -148,11 +147,11 @@ def draw_shared(
     Parameters
     ----------
     config, simulator, rng
-        Settings, and what draws starts and goals, from which random numbers.
+        Settings, what draws starts and goals, and random numbers for it.
     failed : FailedScenarios
-        Those that may be replayed.
+        What may be replayed.
     mirror : Mirror, optional
-        Reflects new scenarios with goals to the left.
+        Reflects new scenarios with goals on the left.
     """
     copies = {"none": 1, "pair": 2, "iteration": 2 * config.directions}[config.sharing]
 
@@ -166,7 +165,7 @@ def draw_shared(
 
 
 def policy_normalizer(config: ARSConfig, seen: Normalizer) -> Normalizer:
-    """Statistics that normalise the inputs of the policy; empty if it does not normalise."""
+    """Statistics that normalise the policy's inputs; empty if none do."""
     return seen if config.normalize else Normalizer.empty(len(seen.mean))
 
 
@@ -178,7 +177,7 @@ def perturbed_policies(theta: Array, step: Array, normalizer: Normalizer) -> Net
     theta, step : ndarray, shape (n_actions, n_observations) and (N, n_actions, n_observations)
         Parameters, and what is added to them, and subtracted.
     normalizer : Normalizer
-        Statistics mu and Sigma, which are folded in.
+        Statistics mu and Sigma, folded in.
     """
     maps = np.concatenate([theta + step, theta - step]) * input_scale(normalizer.std)
     by_input = np.ascontiguousarray(maps.transpose(2, 0, 1))
@@ -187,15 +186,15 @@ def perturbed_policies(theta: Array, step: Array, normalizer: Normalizer) -> Net
 
 
 def mean_and_deviation(values: Array) -> tuple[float, float]:
-    """Mean and population standard deviation of some numbers, shape (n,), added up in order."""
+    """Mean and population standard deviation of numbers, shape (n,), in order."""
     mean = float(np.cumsum(values)[-1]) / len(values)
     return mean, math.sqrt(np.cumsum((values - mean) ** 2)[-1] / len(values))
 
 
 def top_directions(returns: Array, b: int) -> NDArray[np.int64]:
-    """Indices of exactly b directions with the largest max(r+, r-); ties keep their order.
+    """Indices of the b directions with the largest max(r+, r-); ties keep order.
 
-    Returns of the positive and of the negative perturbations have the shape (2, N).
+    Returns r+ and r- have the shape (2, N).
     """
     return np.argsort(-returns.max(axis=0), kind="stable")[:b]
 
@@ -203,23 +202,22 @@ def top_directions(returns: Array, b: int) -> NDArray[np.int64]:
 def ars_step(config: ARSConfig, delta: Array, returns: Array, step_size: float) -> Array:
     """Update of theta: alpha / (b sigma_R) times the sum of (r+ - r-) delta over the top b.
 
-    sigma_R is the population standard deviation of the returns of all perturbations, as the paper
-    defines it in section 2.1; the step is zero when all returns tie.
+    sigma_R is the population standard deviation of all returns (paper, section
+    2.1); the step is zero when all returns tie.
 
     Parameters
     ----------
     config, step_size
         The settings, and the learning rate alpha.
     delta, returns : ndarray, shape (N, n_actions, n_observations) and (2, N)
-        Perturbations, and mean returns r+ and r- of the perturbed policies.
+        Perturbations, and mean returns r+ and r-.
     """
     b = config.top_directions
     top = top_directions(returns, b)
     sigma = mean_and_deviation(returns.reshape(-1))[1] if config.scale_by_deviation else 1.0
     if sigma < 1e-12:
         return np.zeros(delta.shape[1:])
-    difference = returns[0, top] - returns[1, top]
-    weights = step_size / (b * sigma) * difference
+    weights = step_size / (b * sigma) * (returns[0, top] - returns[1, top])
     step: Array = (weights[:, None, None] * delta[top]).sum(axis=0)
     return step
 

@@ -1,6 +1,6 @@
-"""Small networks as policies of Augmented Random Search, with tanh between the layers.
+"""Small networks with tanh as policies of Augmented Random Search.
 
-All parameters are in one row, in the order of `kinarm.Networks`.
+Parameters are in one row, in the order of `kinarm.Networks`.
 """
 
 import math
@@ -19,13 +19,13 @@ from kinarm.policies.normalizer import Normalizer, fold_normalizer
 from kinarm.policies.policy import Layer, Policy
 
 DEVIATION = 1.5
-"""Standard deviation of what a unit of the first layer adds up to, for normalised observations."""
+"""Standard deviation of units of the first layer, for normalised inputs."""
 
 
 def perturbations(rng: np.random.Generator, shape: tuple[int, ...]) -> Array:
-    """Draw independent standard normal numbers, the same bits on every machine.
+    """Draw standard normal numbers, the same bits on every machine.
 
-    Those of NumPy's generator depend on the C library's logarithm.
+    NumPy's depend on the C library's logarithm.
     """
     count = math.prod(shape)
     half = -(-count // 2)
@@ -38,24 +38,23 @@ def perturbations(rng: np.random.Generator, shape: tuple[int, ...]) -> Array:
 def first_deviations(n_joints: int) -> Array:
     """Standard deviations of the first layer's initial weights, shape (n_observations,).
 
-    All parts of the observation have the same say: else the few entries of the goal would drown.
+    All parts of the observation count alike, or the few entries of the goal would drown.
     """
     parts = list(part_slices(n_joints).values())
     sizes = np.array([part.stop - part.start for part in parts])
-    deviations: Array = np.repeat(DEVIATION / np.sqrt(len(parts) * sizes), sizes)
-    return deviations
+    return np.repeat(DEVIATION / np.sqrt(len(parts) * sizes), sizes)
 
 
 def initial_network(rng: np.random.Generator, deviations: Array, widths: Sequence[int]) -> Array:
-    """Draw a network that does nothing yet: its last layer and its biases are zero.
+    """Draw a network whose last layer and biases are zero.
 
     Parameters
     ----------
     rng : numpy.random.Generator
-        Draws the other weights, which are normal numbers.
+        Draws the other weights, normal numbers.
     deviations : ndarray, shape (n_observations,)
-        Standard deviations of the first layer's weights, by their input; those of the others are
-        one over the root of the layer's inputs.
+        Standard deviations of the first layer's weights by input; in others,
+        one over the root of the inputs.
     widths : sequence of int
         Widths of the layers after the observation.
 
@@ -74,14 +73,14 @@ def initial_network(rng: np.random.Generator, deviations: Array, widths: Sequenc
 def perturbed_networks(
     theta: Array, step: Array, normalizer: Normalizer, widths: Sequence[int]
 ) -> Networks:
-    """Networks theta + step of normalised observations, then those of theta - step.
+    """Networks theta + step of normalised inputs, then those of theta - step.
 
     Parameters
     ----------
     theta, step : ndarray, shape (1, n_parameters) and (n, 1, n_parameters)
         Parameters, and what is added to them, and subtracted.
     normalizer, widths
-        Statistics, which are folded in, and widths from the observation to the action.
+        Statistics, folded in, and widths from observation to action.
     """
     parameters = np.concatenate([theta + step, theta - step])[:, 0]
     n_in, n_out = widths[:2]
@@ -93,9 +92,9 @@ def perturbed_networks(
 
 
 def network_layers(theta: Array, widths: Sequence[int]) -> tuple[Layer, ...]:
-    """Layers of the network with these parameters, shape (1, n_parameters).
+    """Layers of a network with the parameters theta, shape (1, n_parameters).
 
-    The widths are those from the observation to the action.
+    Widths are those from observation to action.
     """
     return tuple(Layer(weights[0], bias[0]) for weights, bias in _layers(theta, widths))
 
@@ -110,7 +109,7 @@ def _layers(parameters: Array, widths: Sequence[int]) -> Iterator[tuple[Array, A
 
 
 def parameters_of(policy: Policy) -> Array:
-    """Parameters of a policy as a training has them: a linear one has no bias."""
+    """Parameters of a policy for a training; linear ones have no bias."""
     if len(policy.layers) > 1:
         parts = chain(*((weights.T.ravel(), bias) for weights, bias in policy.layers))
         return np.concatenate([*parts])[None]
@@ -125,9 +124,9 @@ TURN = 6.283185307179586
 
 @inlined
 def logarithm(x: float) -> float:
-    """Natural logarithm of a number between 2^-63 and 1, to within 3e-16 of itself.
+    """Natural logarithm of a number between 2^-63 and 1, with relative error 3e-16.
 
-    The polynomial is that of FreeBSD's mathematical library.
+    The polynomial is that of FreeBSD's libm.
     """
     halvings = 0.0 * x
     for doublings in (32.0, 16.0, 8.0, 4.0, 2.0, 1.0):
@@ -154,8 +153,7 @@ def logarithm(x: float) -> float:
 def normal_pairs(numbers: Array) -> None:
     """Make normal numbers of uniform ones in [0, 1), in place (Box and Muller).
 
-    The array has the shape (2, n, LANES); each number of the first half and its partner in the
-    second make a pair of independent ones.
+    The array has the shape (2, n, LANES); numbers of both halves make independent pairs.
     """
     pairs = as_lanes(numbers)
     for i in range(pairs.shape[1]):

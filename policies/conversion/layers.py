@@ -1,11 +1,10 @@
 """Networks of PyTorch as layers of a policy.
 
-Affine maps, clips and activation functions, one after the other, are joined into layers, each with
-a function after it.
+Affine maps, clips and functions are joined into layers with a function each.
 """
 
 from collections.abc import Iterable, Iterator, Mapping
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -13,11 +12,9 @@ from numpy.typing import ArrayLike, NDArray
 from kinarm.errors import InvalidInputError, MissingExtraError
 from kinarm.networks import Activation, Layer
 from kinarm.observation import observation_size
+from kinarm.policies.policy import Policy
 from kinarm.policies.provenance import Provenance, package_versions
 from kinarm.problem import ReachProblem
-
-if TYPE_CHECKING:
-    from kinarm.policies.policy import Policy
 
 CONVERTED = (
     "Sequential, Linear, Tanh, ReLU, ELU (alpha 1), LeakyReLU (slope 0.01), SiLU, Hardtanh, "
@@ -26,14 +23,14 @@ CONVERTED = (
 """Modules that can be converted, for messages."""
 
 UNLIMITED = 2.0**20
-"""Stands for no limit where only some entries have one; scaling by it rounds nothing."""
+"""Limit of entries without one; scaling by it rounds nothing."""
 
 WHOLE = ""
-"""Key of an observation that is no dictionary."""
+"""Key of a flat observation."""
 
 
 class Clip(NamedTuple):
-    """Finite limits of values, the same for all or one for each: shape () or (n,)."""
+    """Finite limits, for all values or for each: shape () or (n,)."""
 
     low: NDArray[np.float64]
     high: NDArray[np.float64]
@@ -45,10 +42,10 @@ Piece = Layer | Clip | Activation
 def chained(
     pieces: Iterable[Piece], n_inputs: int
 ) -> tuple[tuple[Layer, ...], tuple[Activation, ...]]:
-    """Join pieces into layers from the observation to the action, and the function after each.
+    """Join pieces into layers, and the function after each.
 
-    Affine maps in a row become one. A clip to other limits than -1 and 1 is that function between
-    two scalings, which join their neighbours.
+    Affine maps in a row become one. A clip becomes ``hardtanh`` between two scalings, which join
+    their neighbours.
     """
     layers: list[Layer] = []
     activations: list[Activation] = []
@@ -79,30 +76,30 @@ def chained(
 
 
 def policy_of_pieces(
-    kind: "type[Policy]",
+    kind: type[Policy],
     pieces: Iterable[Piece],
     problem: ReachProblem,
     mean: ArrayLike | None = None,
     std: ArrayLike | None = None,
     **origin: Any,
-) -> "Policy":
-    """Make a policy of the steps from an observation to an action.
+) -> Policy:
+    """Make a policy of pieces from the observation to the action.
 
     Parameters
     ----------
     kind : type
         `Policy`.
     pieces, problem
-        The steps in their order, and the problem that they are for.
+        The pieces in order, and their problem.
     mean, std : array_like, shape (n_observations,), optional
-        Statistics by which observations are normalised before; without them they are not.
+        Statistics that normalise observations before, if any.
     **origin
         Fields of `Provenance`, but for problem and versions.
 
     Raises
     ------
     InvalidInputError
-        If they cannot be converted, or map between other numbers of entries.
+        If they cannot be converted, or numbers of entries do not fit.
     """
     arm = problem.load_arm()
     n_observations, n_actions = observation_size(arm.n_joints), arm.n_actuated
@@ -121,12 +118,12 @@ def policy_of_pieces(
 
 
 def module_pieces(module: Any) -> Iterator[Piece]:
-    """Steps of a module, in their order; parameters become float64, which is exact.
+    """Pieces of a module in order; parameters become float64, which is exact.
 
     Raises
     ------
     InvalidInputError
-        If it is, or holds, a module that cannot be converted.
+        If it is or holds a module that cannot be converted.
     MissingExtraError
         If PyTorch is not installed.
     """
@@ -162,7 +159,8 @@ def module_pieces(module: Any) -> Iterator[Piece]:
 def normalization(statistics: Any, sizes: Mapping[str, int]) -> Iterator[Piece]:
     """The map by ``VecNormalize``: (x - mean) / sqrt(var + epsilon), and a clip.
 
-    It has the statistics of some parts of the inputs, whose sizes are given in their order.
+    It has statistics of some parts of the inputs, whose sizes are given in
+    order.
 
     Raises
     ------

@@ -1,13 +1,12 @@
-"""Actors of Stable-Baselines3 and sb3-contrib as policies: of trained models, and of files.
+"""Actors of Stable-Baselines3 and sb3-contrib as policies.
 
-A model sees the observation, whole or in parts, normalised if it was trained so. The statistics of
-this normalisation lie apart from the model.
+A model sees the observation, whole or in parts. The statistics that normalise it lie apart.
 """
 
 import warnings
 from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from gymnasium.spaces import Box, Dict
@@ -31,27 +30,25 @@ from kinarm.policies.conversion.statistics import (
     find_vec_normalize,
     load_vec_normalize,
 )
+from kinarm.policies.policy import Policy
 from kinarm.problem import ProblemLike, ReachProblem
 from kinarm.simulator import Simulator
 
-if TYPE_CHECKING:
-    from kinarm.policies.policy import Policy
-
 COMPARED, ALIKE = 64, 1e-3
-"""Observations on which every conversion is compared with its model, and how closely."""
+"""Observations for comparing a conversion with its model, and how closely."""
 
 FAMILIES = ("TQCPolicy", "SACPolicy", "TD3Policy", "ActorCriticPolicy")
 """Classes of policies that can be converted."""
 
 NOT_SETTINGS = ("verbose", "seed", "num_timesteps", "start_time", "tensorboard_log", "device")
-"""Attributes of a model that say nothing about how it was trained, or are kept elsewhere."""
+"""Attributes of a model that do not tell how it was trained."""
 
 ROUNDING = 1e-5
-"""How exactly the bounds of a space of float32 have to agree."""
+"""How closely the bounds of float32 spaces must agree."""
 
 
 class SB3Model(NamedTuple):
-    """A model, as far as a conversion needs it; its environment is None if it is not known."""
+    """What a conversion needs of a model; ``env`` is None if it is unknown."""
 
     policy: Any
     algorithm: str
@@ -60,17 +57,17 @@ class SB3Model(NamedTuple):
 
     @property
     def problem(self) -> ReachProblem | None:
-        """The problem that its environment is of, if that is known."""
+        """The problem of its environment, if known."""
         try:
             problem = self.env.get_attr("simulator", 0)[0].problem
-        except (AttributeError, EOFError, OSError):  # an environment that is none of kinarm's
+        except (AttributeError, EOFError, OSError):  # not an environment of kinarm
             return None
         return problem if isinstance(problem, ReachProblem) else None
 
 
 def policy_from_sb3(
-    kind: "type[Policy]", given: Any, problem: ProblemLike | None, vec_normalize: Any
-) -> "Policy":
+    kind: type[Policy], given: Any, problem: ProblemLike | None, vec_normalize: Any
+) -> Policy:
     """Convert a model; see `Policy.from_sb3`.
 
     Parameters
@@ -80,7 +77,8 @@ def policy_from_sb3(
     given : BaseAlgorithm, str or Path
         The model, or its file.
     problem, vec_normalize
-        As there.
+        The problem of the policy, and the ``VecNormalize`` of its observations,
+        or its file; None for those of the model's environment.
 
     Raises
     ------
@@ -97,7 +95,6 @@ def policy_from_sb3(
     interface, selection, sizes = model_inputs(model.policy, simulator)
     statistics, origin = _statistics_of(model, given, vec_normalize, simulator.arm.n_joints)
     model.policy.set_training_mode(False)
-    pieces = [selection, *normalization(statistics, sizes), *_actor_pieces(model.policy)]
     config = {
         key: value
         for key, value in model.attributes.items()
@@ -109,7 +106,7 @@ def policy_from_sb3(
         config["vec_normalize"] = origin
     policy = policy_of_pieces(
         kind,
-        pieces,
+        [selection, *normalization(statistics, sizes), *_actor_pieces(model.policy)],
         own,
         algorithm=model.algorithm,
         recipe="sb3",
@@ -145,14 +142,14 @@ def _statistics_of(
 
 
 def _actor_pieces(policy: Any) -> Iterator[Piece]:
-    """Steps of the network of a policy's deterministic actions, in their order."""
+    """Pieces of the network of a policy's deterministic actions."""
     actor = getattr(policy, "actor", None)
     if actor is None:
         parts = [policy.mlp_extractor.policy_net, policy.action_net]
     elif hasattr(actor, "latent_pi"):
         parts = [actor.latent_pi, actor.mu]
     else:
-        parts = [actor.mu]  # which ends in the function that keeps actions in their range
+        parts = [actor.mu]  # which ends in the function that limits actions
     for part in parts:
         yield from module_pieces(part)
     if policy.squash_output and len(parts) > 1:
@@ -160,9 +157,9 @@ def _actor_pieces(policy: Any) -> Iterator[Piece]:
 
 
 def _check_same_actions(
-    policy: "Policy", original: Any, statistics: Any, interface: Interface, simulator: Simulator
+    policy: Policy, original: Any, statistics: Any, interface: Interface, simulator: Simulator
 ) -> None:
-    """Refuse a conversion that acts otherwise than its model, whose class may do more."""
+    """Refuse a conversion that acts otherwise than its model."""
     starts, goals = simulator.sample(np.random.default_rng(0), COMPARED)
     observations = simulator.world.observe(starts, goals)
     shown = interface.observe(observations)
@@ -178,7 +175,7 @@ def _check_same_actions(
 
 
 def sb3_model(given: Any) -> SB3Model:
-    """Take from a model, or from its file, what a conversion needs; see `Policy.from_sb3`."""
+    """Take what a conversion needs from a model or its file."""
     if isinstance(given, str | Path):
         return _saved_model(Path(given))
     if not hasattr(given, "policy") or not hasattr(given, "num_timesteps"):
@@ -190,7 +187,7 @@ def sb3_model(given: Any) -> SB3Model:
 
 
 def _saved_model(path: Path) -> SB3Model:
-    """Build the networks of a file, without the buffers that training them would need."""
+    """Build the networks of a file, without the buffers of a training."""
     try:
         from stable_baselines3.common.save_util import load_from_zip_file
     except ImportError as error:
@@ -220,7 +217,7 @@ def _saved_model(path: Path) -> SB3Model:
 
 
 def _family(kind: type) -> str:
-    """The class of policies that a class belongs to, if it is one that can be converted."""
+    """The base class of a policy that can be converted."""
     names = [base.__name__ for base in kind.__mro__]
     if any("Recurrent" in name for name in names):
         raise InvalidInputError(
@@ -236,7 +233,7 @@ def _family(kind: type) -> str:
 
 
 def _algorithm_of(family: str, data: Mapping[str, Any]) -> str:
-    """Which algorithm a file is of; it does not say, but has that algorithm's settings."""
+    """Which algorithm a file is of, judged by its settings."""
     if family == "ActorCriticPolicy":
         return "ppo" if "clip_range" in data else "a2c"
     if family == "TD3Policy":
@@ -245,15 +242,15 @@ def _algorithm_of(family: str, data: Mapping[str, Any]) -> str:
 
 
 def model_inputs(policy: Any, simulator: Simulator) -> tuple[Interface, Layer, dict[str, int]]:
-    """Find out how a policy's features extractor puts its inputs together.
+    """Find out how a features extractor puts its inputs together.
 
-    Returned are the interface that shows observations as the model's environment does, the map from
-    the flat observation to the inputs, and the sizes of their parts, in their order.
+    Returned are the interface of the model's environment, the map from the flat
+    observation to the inputs, and the sizes of their parts in order.
 
     Raises
     ------
     InvalidInputError
-        If it computes features, or the policy has other observations or actions than the arm.
+        If it computes features, or observations or actions are not the arm's.
     """
     _check_actions(policy.action_space, simulator)
     actor = getattr(policy, "actor", None)
@@ -276,7 +273,7 @@ def model_inputs(policy: Any, simulator: Simulator) -> tuple[Interface, Layer, d
 
 
 def _check_actions(space: Any, simulator: Simulator) -> None:
-    """Refuse actions that are not fractions of the joints' velocity limits."""
+    """Refuse actions other than fractions of the velocity limits."""
     n = simulator.n_actions
     fits = isinstance(space, Box) and space.shape == (n,)
     if not fits or (space.low != -1).any() or (space.high != 1).any():
@@ -287,7 +284,7 @@ def _check_actions(space: Any, simulator: Simulator) -> None:
 
 
 def _check_observations(space: Any, interface: Interface, simulator: Simulator) -> None:
-    """Refuse observations that are not those of an arm."""
+    """Refuse observations that are not the arm's."""
     own: Any = interface.observation_space
     if isinstance(space, Box) and isinstance(own, Box):
         frames, rest = divmod(int(np.prod(space.shape)), own.shape[0])
@@ -315,7 +312,7 @@ def _parts(space: Any) -> dict[str, Any]:
 
 
 def _described(space: Any) -> str:
-    """Kind and shape of a space, in a line."""
+    """Kind and shape of a space, for messages."""
     if isinstance(space, Dict):
         return ", ".join(f"{key} {each.shape}" for key, each in space.items())
     return f"{type(space).__name__} of shape {space.shape}"

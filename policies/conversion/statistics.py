@@ -59,13 +59,14 @@ def load_vec_normalize(given: Any) -> Any:
 def check_not_normalized(last: Any, n_joints: int, model: Path) -> None:
     """Refuse a model whose last observations in training were evidently normalised.
 
-    Observations hold the orientations of the joints, quaternions of norm 1. Normalised, they have
-    other norms.
+    Observations hold the orientations of the joints, quaternions of norm 1.
+    Normalised, they have other norms.
 
     Parameters
     ----------
     last : ndarray, mapping or None
-        The last observations of its training, shape (n_envs, n_observations), or their parts.
+        The last observations of its training, shape (n_envs, n_observations),
+        or their parts.
     n_joints : int
         Number of joints of the arm.
     model : Path

@@ -1,4 +1,4 @@
-"""Proven bounds of the steps to goals, and of the distances from them, for batches of trials."""
+"""Proven bounds of steps and distances for batches of trials."""
 
 from functools import partial
 
@@ -13,18 +13,17 @@ from kinarm.policies.oracle.kernels.approach import WAITING, Boxes, layout, sear
 from kinarm.simulator import Simulator
 
 BUDGET = 100_000
-"""Boxes that a proof may examine, for each number of steps."""
+"""Boxes that a proof may examine per number of steps."""
 
 RESOLUTION = 1e-3
-"""By how much a proven distance may fall short of the smallest possible one [m]."""
+"""How far a proven distance may be below the smallest one [m]."""
 
 
 class Prover:
     """Proves bounds for the arm and scene of a simulator.
 
-    Each trial is a `search` of its own, or a few. Starts have the shape (n, n_joints) [rad or m],
-    goals (n, 3) [m]. With ``contact``, what is proven to touch something does not count, and a
-    search may examine as many boxes as are in the ``budget``.
+    Starts have the shape (n, n_joints) [rad or m], goals (n, 3) [m]. With ``contact``, what is
+    proven to touch something does not count. A `search` may examine ``budget`` boxes.
     """
 
     def __init__(self, simulator: Simulator) -> None:
@@ -45,19 +44,19 @@ class Prover:
         contact: bool = False,
         budget: int = BUDGET,
     ) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
-        """Prove how many steps it takes at least to bring the tool to goals.
+        """Prove how many steps it takes at least to reach goals.
 
-        Returned are lower bounds, and whether some configuration that counts attains them, or none
-        reaches the goal in ``most``; for some of the trials, which the rows number.
+        Returned are lower bounds for the ``rows``, and whether a configuration
+        that counts attains them, or none reaches the goal in ``most``.
 
         Parameters
         ----------
         starts, goals, contact, budget
             See `Prover`.
         witnesses : ndarray, shape (n, n_joints)
-            Where configurations go that reach the goals in as many steps [rad or m].
+            Filled with configurations that attain the bounds [rad or m].
         rows, fewest, most : ndarray of int, shape (n_rows,)
-            The trials, and numbers of steps that are examined; fewer are impossible.
+            The trials, and the range of steps; fewer are impossible.
         """
         simulator, n = self._simulator, len(rows)
         lower_bounds, tight = np.empty(n, dtype=np.int64), np.empty(n, dtype=bool)
@@ -82,7 +81,7 @@ class Prover:
                     if steps <= limit if complete else not all_at_once:
                         break
                     # All at once is least work, unless the budget is too small, or contact counts:
-                    # then each number of steps has one, up to those that were found.
+                    # then each number of steps has its own, up to those found.
                     if all_at_once:
                         many, all_at_once = steps - 1, False
 
@@ -98,18 +97,19 @@ class Prover:
         resolution: float = RESOLUTION,
         budget: int = BUDGET,
     ) -> tuple[Array, Array]:
-        """Bound from below how close the tool can come to goals, whatever it touches.
+        """Bound how close the tool can come to goals, whatever it touches.
 
-        Returned are distances proven and found, shape (n, 2) [m], and where they were found.
+        Returned are distances proven and found, shape (n, 2) [m], and
+        configurations.
 
         Parameters
         ----------
         starts, goals, budget
-            See `Prover`; joints that are not actuated stay as at the start.
+            See `Prover`; joints that are not actuated stay.
         box : tuple of ndarray, shape (n, n_actions)
             Lower and upper corners of where the others can be [rad or m].
         resolution : float
-            By how much a proven distance may fall short of the smallest one [m].
+            How far a proven distance may be below the smallest one [m].
         """
         n, n_moved = len(starts), self._simulator.n_actions
         distances, configurations = np.empty((n, 2)), np.empty(starts.shape)
@@ -127,6 +127,6 @@ class Prover:
         return distances, configurations
 
     def _space(self) -> tuple[Array, Boxes]:
-        """Space for the boxes that wait, and for those that are examined."""
+        """Space for boxes that wait and boxes that are examined."""
         n, n_joints = self._simulator.n_actions, self._simulator.arm.n_joints
         return np.empty((WAITING, 2 * n + 1)), layout(n, n_joints).record()

@@ -1,4 +1,4 @@
-"""Inverse kinematics: configurations that bring the tool to a goal without contact."""
+"""Inverse kinematics: contact-free configurations at a goal."""
 
 from typing import NamedTuple
 
@@ -13,11 +13,11 @@ from kinarm.randomness import low_discrepancy_points
 from kinarm.simulator import Simulator
 
 RESERVE = 1e-6
-"""Share of the tolerance that is left against rounding."""
+"""Share of the tolerance kept against rounding."""
 
 
 class Solutions(NamedTuple):
-    """Configurations at a goal where nothing touches, shape (m, n_joints), and whose goal it is."""
+    """Contact-free configurations at goals, shape (m, n_joints), and the goals' rows."""
 
     configurations: Array
     owner: NDArray[np.int64]
@@ -31,17 +31,17 @@ def inverse_kinematics(
     samples: int = 1024,
     separation: float = 0.2,
 ) -> Array:
-    """Find the distinct contact-free configurations that reach a goal within the horizon.
+    """Find distinct contact-free configurations at a goal within the horizon.
 
-    Evenly spread configurations and the current one are moved into the ball about the goal by
-    damped least squares within the limits. Of a continuum of solutions, those returned differ.
+    Evenly spread configurations and the current one are moved into the ball
+    about the goal by damped least squares within the limits.
 
     Parameters
     ----------
     simulator : Simulator
         Arm, scene and tolerance.
     start : array_like, shape (n_joints,)
-        Current configuration; axes that are not actuated stay there [rad or m].
+        Current configuration; axes that are not actuated stay [rad or m].
     goal : array_like, shape (3,)
         Goal position [m].
     samples : int
@@ -52,7 +52,7 @@ def inverse_kinematics(
     Returns
     -------
     ndarray, shape (k, n_joints)
-        The solution that takes the fewest steps first [rad or m]; k may be 0.
+        Solutions, that of the fewest steps first [rad or m]; k may be 0.
     """
     q = finite_array("start", start, (simulator.arm.n_joints,))
     g = finite_array("goal", goal, (3,))
@@ -79,21 +79,20 @@ def solve_within(
     guesses: Array,
     samples: int,
 ) -> Solutions:
-    """Find contact-free configurations close to goals that are at most some steps away.
+    """Find contact-free configurations close to goals within some steps.
 
     Parameters
     ----------
     simulator : Simulator
         Arm and scene.
     starts, guesses : ndarray, shape (m, n_joints)
-        Where the arm is, and configurations that may be close to a solution [rad or m].
+        Where the arm is, and likely solutions [rad or m].
     goals : ndarray, shape (m, 3)
         Goal positions [m].
     steps, tolerances : ndarray of int and of float, shape (m,)
-        Steps at most from the starts, and distances at most from the goals [m].
+        Most steps from the starts, and largest distances from the goals [m].
     samples : int
-        From how many configurations each search begins: the start, the guess, and others that are
-        evenly spread.
+        Configurations to begin from: start, guess, and evenly spread ones.
     """
     m, n_joints = len(starts), simulator.arm.n_joints
     box = step_box(simulator, starts, steps)
@@ -104,7 +103,7 @@ def solve_within(
     beginnings[:, 1 % samples] = guesses
     beginnings[:, 0] = starts
     beginnings[:, :, moved] = np.clip(beginnings[:, :, moved], lower, upper)
-    # Half of the solutions may rest on the rim of the ball, the others lie throughout it.
+    # Half of the solutions may rest on the rim of the ball, the others within.
     shares = np.where(np.arange(samples) % 2 == 0, 1.0, np.cbrt(spread[:, -1]))
     owner = np.repeat(np.arange(m), samples)
     allowed = (tolerances * (1.0 - RESERVE))[owner]
@@ -126,9 +125,10 @@ def project(
     goals: Array,
     radius: Array,
 ) -> tuple[Array, Array]:
-    """Move configurations towards goals by damped least squares; contact is ignored.
+    """Move configurations towards goals by damped least squares.
 
-    Returns where they ended [rad or m], and the distances from tool to goal [m].
+    Returns where they end [rad or m], and distances from tool to goal [m].
+    Contact is ignored.
 
     Parameters
     ----------
@@ -137,9 +137,11 @@ def project(
     configurations : ndarray, shape (k, n_joints)
         Where they begin [rad or m].
     owner, radius : ndarray of int and of float, shape (k,)
-        Row of the box and of the goals for each, and how far from the goal it may rest [m].
+        Row of box and goals for each, and how far from the goal it may rest
+        [m].
     box, goals : tuple of ndarray, shape (m, n_actions), and ndarray, shape (m, 3)
-        Lower and upper corners, which they do not leave [rad or m], and goal positions [m].
+        Lower and upper corners of their limits [rad or m], and goal positions
+        [m].
     """
     ended, distances = configurations.copy(), np.empty(len(configurations))
     arrays = (simulator.world.records[0], owner, *box, goals, radius, ended, distances)
@@ -153,7 +155,7 @@ def project(
 
 
 def step_box(simulator: Simulator, starts: Array, steps: NDArray[np.int64]) -> tuple[Array, Array]:
-    """Corners of what the joints can reach from starts in some steps.
+    """Corners of what joints can reach in some steps.
 
     Parameters
     ----------
@@ -177,9 +179,10 @@ def step_box(simulator: Simulator, starts: Array, steps: NDArray[np.int64]) -> t
 
 
 def steps_between(simulator: Simulator, first: Array, second: Array) -> Array:
-    """Steps that the straight motion between configurations takes, before rounding up.
+    """Steps of the straight motion between configurations, before rounding up.
 
-    The slowest joint decides: the largest of |dq_i| / (rate_i dt) over the actuated joints.
+    The slowest joint decides: the largest of |dq_i| / (rate_i dt) over the
+    actuated joints.
 
     Parameters
     ----------

@@ -1,6 +1,6 @@
-"""Search for the motions that reach goals in the fewest steps, as tables of actions.
+"""Search for the motions that reach goals in the fewest steps.
 
-Detours around obstacles are planned by RRT-Connect with shortcuts (Kuffner and LaValle 2000).
+Detours are planned by RRT-Connect with shortcuts (Kuffner and LaValle 2000).
 """
 
 import hashlib
@@ -20,36 +20,35 @@ from kinarm.randomness import low_discrepancy_points
 from kinarm.simulator import Simulator
 
 SAMPLES, VIAS = (8, 48, 512), 128
-"""For each number of steps: configurations from which goals are sought, a few, then more; and
-motions by way of another configuration that are tried."""
+"""Configurations to seek goals from, in turn, and motions by way of others, per number of steps."""
 
 DETOURS = 4
-"""Detours that are planned for a trial; the shortest one counts."""
+"""Detours planned for a trial; the shortest counts."""
 
 APPROACHES = (0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5)
-"""Distances beyond the smallest possible one to which a goal is approached, in turn [m]."""
+"""Distances beyond the smallest possible one that are tried in turn [m]."""
 
 MISS_COST = 1000.0
-"""Cost of a motion that misses the goal without contact, beside its final distance in metres."""
+"""Cost of a contact-free miss, beside its final distance in metres."""
 
 
 class MotionSearch:
-    """The best motions found so far for a lot of trials.
+    """The best motions found so far for some trials.
 
-    A motion that reaches the goal costs its steps, one that misses it more, and contact is
-    out of the question. What counts is the outcome in the simulator.
+    Reaching the goal costs the steps taken, missing it more, and contact is
+    ruled out. The outcome in the simulator counts.
 
     Attributes
     ----------
     witnesses : ndarray, shape (n, n_joints)
-        Configurations that attain what was proven last, from which goals are sought [rad or m].
+        Configurations that attain what was proven last [rad or m].
     actions : ndarray, shape (n, horizon, n_actions)
-        The motions; at rest where there is none.
+        The motions; zero where there is none.
     costs : ndarray, shape (n,)
         Their costs; infinite where there is none.
     solved : ndarray of int, shape (n,)
-        Fewest steps in which a contact-free configuration at the goal was found, whether or not a
-        motion leads there; the horizon + 1 where there is none.
+        Fewest steps to a contact-free configuration at the goal, with or
+        without a motion; the horizon + 1 if none was found.
     """
 
     def __init__(self, simulator: Simulator, starts: Array, goals: Array) -> None:
@@ -67,12 +66,12 @@ class MotionSearch:
 
     @property
     def steps(self) -> NDArray[np.int64]:
-        """Steps of the motions, shape (n,); the horizon + 1 where none reaches the goal."""
+        """Steps of the motions, shape (n,); the horizon + 1 for a miss."""
         steps: NDArray[np.int64] = np.fmin(self.costs, self.simulator.task.horizon + 1).astype(int)
         return steps
 
     def try_steps(self, rows: NDArray[np.int64], steps: NDArray[np.int64]) -> None:
-        """Look for motions of so many steps in trials where none reaches the goal yet."""
+        """Look for motions of so many steps where none reaches the goal yet."""
         for samples in SAMPLES:
             due = ~self.reached[rows] & (steps <= self.simulator.task.horizon)
             rows, steps = rows[due], steps[due]
@@ -84,14 +83,14 @@ class MotionSearch:
         self._try_vias(rows, steps, solutions, np.flatnonzero(~self.reached[rows] & (steps > 1)))
 
     def try_detours(self, rows: NDArray[np.int64]) -> None:
-        """Plan detours where no motion reaches the goal yet, some for each trial."""
+        """Plan detours where no motion reaches the goal yet."""
         for row in rows[~self.reached[rows]]:
             ends = inverse_kinematics(self.simulator, self.starts[row], self.goals[row])
             if len(ends) == 0:
                 continue
             nearest = steps_between(self.simulator, self.starts[row], ends[0])
             self.solved[row] = min(self.solved[row], int(np.ceil(nearest)))
-            # Random numbers of a trial are a function of its start and goal.
+            # Random numbers of a trial depend on its start and goal alone.
             numbers = np.concatenate([self.starts[row], self.goals[row]]) + 0.0
             digest = hashlib.sha256(numbers.tobytes()).digest()
             rng = np.random.default_rng(np.frombuffer(digest, dtype=np.uint32))
@@ -105,7 +104,7 @@ class MotionSearch:
                         self._replay(np.array([row]), actions[None])
 
     def try_approach(self, rows: NDArray[np.int64], distances: Array) -> None:
-        """Look for motions that end as close to goals as may be possible, which none reaches."""
+        """Look for motions that end as close as possible to goals out of reach."""
         for nearer in APPROACHES:
             due = np.isinf(self.costs[rows])
             rows, distances = rows[due], distances[due]
@@ -118,7 +117,7 @@ class MotionSearch:
     def _try_straight(
         self, rows: NDArray[np.int64], steps: NDArray[np.int64], tolerances: Array, samples: int
     ) -> Solutions:
-        """Try straight motions to configurations close to the goals; owners count in ``rows``."""
+        """Try straight motions to the goals; owners count in ``rows``."""
         starts, goals, guesses = self.starts[rows], self.goals[rows], self.witnesses[rows]
         found = solve_within(self.simulator, starts, goals, steps, tolerances, guesses, samples)
         owner, ends = found.owner, found.configurations
@@ -134,7 +133,7 @@ class MotionSearch:
         solutions: Solutions,
         due: NDArray[np.int64],
     ) -> None:
-        """Try motions by way of configurations from which the solutions are reached in time."""
+        """Try motions by way of configurations between starts and solutions."""
         lots = [np.flatnonzero(solutions.owner == row) for row in due]
         chosen = [np.resize(lot, VIAS) for lot in lots if lot.size]
         if not chosen:
@@ -153,7 +152,7 @@ class MotionSearch:
         self._replay(rows[owner], two_segments(self.simulator, starts, vias, ends, turn, total))
 
     def _replay(self, trials: NDArray[np.int64], actions: Array) -> None:
-        """Run motions in the simulator, and keep the best of each trial if it is a better one."""
+        """Run motions in the simulator, and keep those better than before."""
         outcome = self.simulator.rollout_actions(actions, self.starts[trials], self.goals[trials])
         missed = np.where(outcome.collision, np.inf, MISS_COST + outcome.distance)
         costs = np.where(outcome.success, outcome.steps, missed)
@@ -172,7 +171,7 @@ def two_segments(
     turn: NDArray[np.int64],
     steps: NDArray[np.int64],
 ) -> Array:
-    """Actions that move straight to one configuration, then straight to another, then rest.
+    """Actions that move straight to one configuration, then another, then rest.
 
     Shape (m, horizon, n_actions).
 
@@ -183,7 +182,7 @@ def two_segments(
     starts, vias, ends : ndarray, shape (m, n_joints)
         Where the motions begin, turn and end [rad or m].
     turn, steps : ndarray of int, shape (m,)
-        Steps to the turn, and to the end; where these are equal, the ends are not visited.
+        Steps to the turn, and to the end; if equal, the ends are not visited.
     """
     moved = slice(simulator.n_actions)
     after = np.maximum(steps - turn, 1)
@@ -191,10 +190,8 @@ def two_segments(
     second = (ends - vias)[:, moved] / (after[:, None] * simulator.step_limit)
     step = np.arange(simulator.task.horizon)[None, :, None]
     turning, ending = turn[:, None, None], steps[:, None, None]
-    actions: Array = np.where(
-        step < turning, first[:, None], np.where(step < ending, second[:, None], 0.0)
-    )
-    return actions
+    later = np.where(step < ending, second[:, None], 0.0)
+    return np.where(step < turning, first[:, None], later)
 
 
 def along_path(simulator: Simulator, path: Array, *, through_corners: bool) -> Array | None:
@@ -207,9 +204,9 @@ def along_path(simulator: Simulator, path: Array, *, through_corners: bool) -> A
     simulator : Simulator
         The arm, its step and the horizon.
     path : ndarray, shape (m, n_joints)
-        Configurations, connected by straight segments [rad or m].
+        Configurations at the corners [rad or m].
     through_corners : bool
-        Whether a step ends at every one of them; else steps cut corners, and are fewer.
+        Whether a step ends at every corner; else steps cut corners.
     """
     lengths = steps_between(simulator, path[:-1], path[1:])
     if through_corners:
@@ -228,14 +225,14 @@ def along_path(simulator: Simulator, path: Array, *, through_corners: bool) -> A
 
 
 EXTENSIONS, LONGEST_EXTENSION = 1500, 6.0
-"""Samples before the search is given up, and how far a tree grows towards one [steps]."""
+"""Samples at most, and how far a tree grows towards one [steps]."""
 
 SHORTCUTS = 120
-"""Pairs of points of a path between which the straight way is tried."""
+"""Pairs of points between which the straight way is tried."""
 
 
 class Tree:
-    """Configurations that are connected by contact-free straight motions, from some roots."""
+    """Configurations connected to roots by contact-free straight motions."""
 
     def __init__(self, roots: Array) -> None:
         self.nodes = roots.copy()
@@ -248,7 +245,7 @@ class Tree:
         return len(self.parents) - 1
 
     def path_to_root(self, node: int) -> list[Array]:
-        """Nodes from a given one to its root."""
+        """Nodes from this one to its root."""
         found = []
         while node >= 0:
             found.append(self.nodes[node])
@@ -259,15 +256,15 @@ class Tree:
 def find_detour(
     simulator: Simulator, start: Array, ends: Array, rng: np.random.Generator
 ) -> Array | None:
-    """Find a contact-free path of straight segments to one of several configurations.
+    """Find a contact-free path of straight segments to one of several ends.
 
-    A tree grows from either side, in turns, until they meet. The path has the shape (m, n_joints);
-    None if none was found.
+    Two trees grow in turns until they meet. The path has the shape (m,
+    n_joints); None if none was found.
 
     Parameters
     ----------
     simulator, rng
-        Arm and scene, and what draws samples and shortcuts.
+        Arm and scene, and the source of samples and shortcuts.
     start, ends : ndarray, shape (n_joints,) and (k, n_joints)
         Where the path begins and may end, without contact [rad or m].
     """
@@ -291,7 +288,7 @@ def find_detour(
 
 
 def _extend(simulator: Simulator, tree: Tree, sample: Array, longest: float) -> int | None:
-    """Grow a tree from its node nearest to a sample towards it, as far as nothing touches."""
+    """Grow a tree towards a sample, as far as nothing touches."""
     distances = steps_between(simulator, tree.nodes, sample)
     nearest = int(distances.argmin())
     if distances[nearest] < 1e-9:
@@ -303,7 +300,7 @@ def _extend(simulator: Simulator, tree: Tree, sample: Array, longest: float) -> 
 
 
 def _straight_way(simulator: Simulator, first: Array, second: Array) -> tuple[Array, int]:
-    """Configurations as far apart as a step tests them, and how many in a row touch nothing."""
+    """Configurations on the way, and how many in a row touch nothing."""
     tested_each = simulator.problem.stepping.tested_configurations
     count = max(1, int(np.ceil(tested_each * steps_between(simulator, first, second))))
     tested = first + np.arange(1, count + 1)[:, None] / count * (second - first)

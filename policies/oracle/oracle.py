@@ -1,17 +1,19 @@
 """The oracle: bounds of what any policy could reach, and in how many steps.
 
-For each trial the oracle *proves* bounds and *finds* a motion; the best policy lies between them.
+For each trial it *proves* bounds and *finds* a motion; the best policy lies
+between them.
 
-Proven, by branch and bound over all configurations within reach: the number of steps below which
-no policy can bring the tool within the tolerance of the goal; and, where none can within the
-horizon, a distance that no policy can beat, to a millimetre if the budget suffices. Contact is
-ignored in that, which makes both hold all the more. Where the motion found is slower than the
-bound, the bound is raised: a motion does not end where the arm touches something, as far as its
-shapes are capsules. Boxes and distances are enlarged by 1e-9 to cover rounding. When the budget of
-a proof runs out, what is proven so far stands and is marked as incomplete.
+Proven, by branch and bound over all configurations within reach: the fewest
+steps in which any policy can bring the tool within the tolerance of the goal;
+and, where none can within the horizon, a distance that no policy can beat, to a
+millimetre if the budget suffices. Both ignore contact, and hold with it all the
+more. Where the motion found is slower, contact raises the bound: no motion ends
+where the arm touches something, as far as its shapes are capsules. Boxes and
+distances are enlarged by 1e-9 to cover rounding. When a budget runs out, what
+is proven stands, marked as incomplete.
 
-Found, by search, and replayed in the simulator: a motion that reaches the goal without contact. It
-need not be the fastest one, and that none was found proves nothing.
+Found, by search, and replayed in the simulator: a contact-free motion to the goal. It need not be
+the fastest, and finding none proves nothing.
 """
 
 from collections.abc import Callable, Iterator
@@ -30,10 +32,10 @@ from kinarm.problem import ProblemLike
 from kinarm.simulator import Simulator
 
 ORACLE_SEMANTICS = "2"
-"""Version of what the oracle proves and finds: raised with every change of its results."""
+"""Version of the oracle's results: raised when they change."""
 
 EXTRA_STEPS = 24
-"""How far above its lower bound the number of steps is raised before a detour is planned."""
+"""Steps above the lower bound that are tried before a detour is planned."""
 
 LOT = 128
 """Trials that are solved together."""
@@ -44,15 +46,15 @@ Progress = Callable[[int, int], object]
 class Oracle:
     """Bounds what any policy could do in given trials.
 
-    The result for a trial depends on nothing else: not on other trials, their order or the
-    number of threads.
+    A result does not depend on other trials, their order or the number of
+    threads.
 
     Parameters
     ----------
     problem : ReachProblem, str or Path
-        The problem, its name or its file; its rewards do not matter.
+        The problem, its name or its file; rewards do not matter.
     threads : int, optional
-        Threads to use; as many as the processors that this process may use by default.
+        Threads to use; by default as many as available processors.
     """
 
     def __init__(self, problem: ProblemLike, *, threads: int | None = None) -> None:
@@ -79,7 +81,7 @@ class Oracle:
         goals : array_like, shape (n, 3) or (3,)
             Goal positions, or one for all starts [m].
         on_progress : callable, optional
-            Called with the number of trials solved so far and in all.
+            Called with the numbers of trials solved and in all.
 
         Raises
         ------
@@ -101,7 +103,7 @@ class Oracle:
         return OracleSolutions.concatenated(parts)
 
     def _solve_lot(self, starts: Array, goals: Array) -> "OracleSolutions":
-        """From trials to bounds, motions and their replay."""
+        """Bounds, motions and their replay."""
         horizon, n = self.simulator.task.horizon, len(starts)
         search = MotionSearch(self.simulator, starts, goals)
         trials, limits = (starts, goals, search.witnesses), np.tile([[1], [horizon]], n)
@@ -128,11 +130,11 @@ class Oracle:
     def _count_contact(
         self, search: MotionSearch, steps_bounds: NDArray[np.int64], complete: NDArray[np.bool_]
     ) -> None:
-        """Raise the bounds of motions that are slower, and of goals that none reaches."""
+        """Raise bounds where motions are slower, or none reaches the goal."""
         horizon = self.simulator.task.horizon
         trials = (search.starts, search.goals, search.witnesses)
         bound_steps = self._prover.bound_steps
-        # A contact-free configuration ends the proof, whether or not the motion goes there.
+        # A contact-free configuration ends the proof, even without a motion to it.
         fewest = np.fmin(search.steps, search.solved)
         slow = np.flatnonzero(search.reached & (fewest > steps_bounds))
         steps_bounds[slow], complete[slow] = bound_steps(
@@ -141,13 +143,12 @@ class Oracle:
         blocked = np.flatnonzero((fewest > horizon) & (steps_bounds <= horizon))
         last = np.full(blocked.size, horizon)
         beyond, _ = bound_steps(*trials, blocked, last, last, contact=True)
-        unsettled = ~search.reached & (steps_bounds <= horizon)
-        complete[unsettled] = False
+        complete[~search.reached & (steps_bounds <= horizon)] = False
         shut = blocked[beyond > horizon]
         steps_bounds[shut], complete[shut] = horizon + 1, True
 
     def _approach(self, search: MotionSearch, steps_bounds: NDArray[np.int64]) -> Array:
-        """Prove, and seek, how close motions come to the goals that none reaches."""
+        """Prove, and seek, how close motions come to goals that none reaches."""
         task, missed = self.simulator.task, np.flatnonzero(~search.reached)
         starts, goals = search.starts[missed], search.goals[missed]
         box = step_box(self.simulator, starts, np.full(missed.size, task.horizon))
@@ -184,22 +185,24 @@ class OracleSolution:
     Attributes
     ----------
     reachable : bool
-        Whether a motion was found that reaches the goal in the simulator.
+        Whether the motion reaches the goal in the simulator.
     steps : int
         Steps of the motion; the horizon if it does not reach the goal.
     steps_lower_bound : int
-        Proven: no motion reaches the goal in fewer steps. The horizon + 1 if none does within the
-        horizon.
+        Proven: no motion reaches the goal in fewer steps. The horizon + 1 if it
+        is out of reach.
     proof_complete : bool
-        Whether some configuration at the goal, not proven to touch anything, is that many steps
-        away, or the motion takes as many, or the goal is proven to be out of reach. Else the budget
-        of the proof ran out. Contact on the way is no part of it, so ``steps`` may be more.
+        Whether a configuration at the goal, not proven to touch anything, is
+        that many steps away, the motion takes as many, or the goal is proven to
+        be out of reach. Else the budget ran out. Contact on the way may make
+        ``steps`` larger.
     final_distance : float
-        Distance from the tool to the goal at the end of the motion [m].
+        Distance from tool to goal at the end of the motion [m].
     distance_lower_bound : float
-        Proven: no motion within the horizon ends closer to the goal [m]. Zero if one reaches it.
+        Proven: no motion within the horizon ends closer [m]. Zero if one
+        reaches the goal.
     path : ndarray, shape (steps + 1, n_joints)
-        Configurations of the motion, as the simulator went through them [rad or m].
+        Configurations of the motion in the simulator [rad or m].
     actions : ndarray, shape (steps, n_actions)
         Actions of the motion.
     reason : str or None
@@ -224,7 +227,7 @@ NUMBERS = [item.name for item in fields(OracleSolution)][:6]
 class OracleSolutions:
     """Bounds and motions of n trials; indexing gives an `OracleSolution`.
 
-    Arrays of shape (n,) hold what is said there; the others are
+    Its fields are arrays of shape (n,) here; the others are
 
     Attributes
     ----------

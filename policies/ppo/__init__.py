@@ -1,4 +1,4 @@
-"""Proximal Policy Optimization: its settings, the state of a training, and itself as a learner."""
+"""Proximal Policy Optimization: settings, state of a training, and learner."""
 
 import math
 from dataclasses import dataclass, field
@@ -8,33 +8,25 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kinarm._fields import OPTIONAL
-from kinarm.errors import InvalidInputError
+from kinarm.errors import NOT_NEGATIVE, POSITIVE, SHARE, InvalidInputError
 from kinarm.failed_scenarios import LARGEST_REPLAY, FailedScenarios
-from kinarm.policies.config import (
-    MANY,
-    NOT_NEGATIVE,
-    POSITIVE,
-    SHARE,
-    WIDTHS,
-    Schedule,
-    TrainingConfig,
-)
+from kinarm.policies.config import MANY, WIDTHS, Schedule, TrainingConfig
 from kinarm.policies.learners import TrainingState, imported
 from kinarm.policies.normalizer import Normalizer
 from kinarm.policies.recipes import shipped_learner
 from kinarm.problem import ReachProblem
 
 SETTLED = 0.9
-"""Share of a training after which noise and tolerance have their final values."""
+"""Share of a training after which noise and tolerance are final."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class PPOConfig(TrainingConfig):
     """Settings of a training of 1.2 million environment steps, as in the paper.
 
-    The paper gives no other settings. Names and defaults are those of Stable-Baselines3, with two
-    exceptions for speed: 16 environments fill the rollouts of 2000 steps, and minibatches are
-    larger.
+    The paper gives no others. Names and defaults are those of
+    Stable-Baselines3. For speed, 16 environments fill the rollouts of 2000
+    steps, and minibatches are larger.
 
     Parameters
     ----------
@@ -55,7 +47,7 @@ class PPOConfig(TrainingConfig):
     learning_rate : float
         Step size of Adam.
     learning_rate_schedule : {"constant", "linear"}
-        Whether the learning rate stays or falls linearly to zero.
+        Whether it stays or falls linearly to zero.
     gamma : float
         Discount per step.
     gae_lambda : float
@@ -67,51 +59,51 @@ class PPOConfig(TrainingConfig):
     vf_coef : float
         Weight of the critic's loss.
     max_grad_norm : float
-        Largest norm of a gradient; longer ones are clipped to it.
+        Largest norm of a gradient; longer ones are clipped.
     log_std_init : float
-        Logarithm of the standard deviation of the actions at the beginning.
+        Initial logarithm of the standard deviation of the actions.
     final_log_std : float, optional
-        Logarithm of the standard deviation of the actions at the end, to which it changes
-        linearly. Without it, PPO learns the standard deviation.
+        Final logarithm of the standard deviation, which changes linearly;
+        without it, PPO learns it.
     training_tolerance : float, optional
-        Distance at which an episode of the training counts as a success [m]. It is the task's
-        tolerance if it is not given.
+        Distance that counts as a success in the training [m]; by default the
+        task's tolerance.
     initial_tolerance : float, optional
-        Training tolerance until start spread and discount have reached their final values; then
-        it changes geometrically to the final tolerance [m].
+        Training tolerance until start spread and discount are final; then it
+        changes geometrically [m].
     stop_at_goal : bool
-        Whether success in the training takes two steps in a row within the training tolerance, so
-        that the hand does not only pass the goal. At the last step, one is enough.
+        Whether success in the training takes two steps in a row within the
+        tolerance, so that the hand stops at the goal. At the last step, one is
+        enough.
     symmetric : bool
-        Whether the policy treats mirror images alike, if arm and obstacles are their own mirror
-        image; it then learns from goals on the right and from mirror images of those on the left.
+        Whether the policy treats mirror images alike, if arm and obstacles are
+        symmetric; it then learns from goals on the right and mirror images of
+        others.
     initial_start_spread : float
-        Spread of the start configurations at the beginning of the training, as a share of the
-        task's.
+        Initial spread of the start configurations, as a share of the task's.
     initial_gamma : float, optional
-        Discount per step at the beginning of the training; ``gamma`` if it is not given.
+        Initial discount per step; by default ``gamma``.
     initial_penalty : float
-        Share of the penalty for contact that counts at the beginning of the training; it grows
-        linearly to the whole penalty at the end.
+        Share of the penalty for contact that counts at first; it grows linearly
+        to the whole.
     widening : float
-        Share of the training in which spread and discount change linearly to their final values.
+        Share of the training in which spread and discount change linearly.
     replay_share : float
         Probability that an episode begins where an earlier one failed; see
         `kinarm.failed_scenarios`.
     replay_size : int
         Failed scenarios that are kept.
     replay_log_std : float, optional
-        Smallest logarithm of the standard deviation of the actions in replayed episodes; with
-        less noise, a policy never succeeds where it always fails. Without it, replayed episodes
-        have the noise of the others.
+        Smallest logarithm of the standard deviation in replayed episodes: with
+        less noise, a policy never succeeds where it always fails. By default
+        there is none.
     replay_noise_steps : int, optional
-        Steps at the beginning of a replayed episode in which it has that noise; all of them, if
-        it is not given.
+        First steps of a replayed episode that have that noise; by default all.
     initial_policy : str, optional
-        Name or file of a policy that the training begins with; it must have the same layers, and
-        may be for another problem or arm.
+        Name or file of a policy to begin with; it must have the same layers,
+        and may be for another problem or arm.
     demonstrations : int
-        Trials that the oracle solves before the training; the actor imitates its motions.
+        Trials that the oracle solves first; the actor imitates its motions.
     """
 
     iterations: int = 600
@@ -155,7 +147,7 @@ class PPOConfig(TrainingConfig):
         "replay_log_std": "none, noise as in others",
         "replay_noise_steps": "all",
     }
-    """Meaning of leaving an option out whose field has no value by default."""
+    """Meaning of leaving out an option that has no default value."""
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -183,12 +175,12 @@ class PPOConfig(TrainingConfig):
 
     @property
     def training_problem(self) -> ReachProblem:
-        """The problem with the reward and tolerance of these settings, which is trained on."""
+        """The problem with the reward and tolerance of these settings."""
         return self.problem.replace(reward=self.reward, tolerance=self.training_tolerance)
 
     @property
     def can_extend(self) -> bool:
-        """Whether a training with more iterations begins just as this one goes."""
+        """Whether a longer training begins just as this one goes."""
         settled = self.widening == 0 and self.initial_penalty == 1
         unset = self.final_log_std is None and self.initial_tolerance is None
         return self.learning_rate_schedule == "constant" and settled and unset
@@ -204,7 +196,7 @@ class PPOConfig(TrainingConfig):
         return self._widened(self.initial_gamma, self.gamma, done)
 
     def log_std_at(self, done: float) -> float | None:
-        """Logarithm of the deviation of actions after this share of the training, if it is set."""
+        """Logarithm of the deviation after a share of the training, if set."""
         if self.final_log_std is None:
             return None
         settled = min(1.0, done / SETTLED)
@@ -219,7 +211,7 @@ class PPOConfig(TrainingConfig):
         if done <= self.widening:
             return initial
         fallen = (done - self.widening) / (SETTLED - self.widening)
-        # Rounded, for powers differ between C libraries in the last bits.
+        # Rounded, for powers differ between C libraries.
         return round(initial * math.pow(final / initial, fallen), 9)
 
     def penalty_at(self, done: float) -> float:
@@ -227,7 +219,7 @@ class PPOConfig(TrainingConfig):
         return self.initial_penalty + (1 - self.initial_penalty) * done
 
     def _widened(self, initial: float, final: float, done: float) -> float:
-        """A value between an initial and a final one, after this share of the training."""
+        """A value between two, after this share of the training."""
         if done >= self.widening:
             return final
         grown = done / self.widening
@@ -235,12 +227,12 @@ class PPOConfig(TrainingConfig):
 
 
 class EpisodeStates(NamedTuple):
-    """The state of running episodes; everything else follows from it.
+    """The state of running episodes.
 
     Attributes
     ----------
     q, start : ndarray, shape (n, n_joints)
-        Configurations, and those in which they began [rad or m].
+        Current and first configurations [rad or m].
     goal : ndarray, shape (n, 3)
         Goal positions [m].
     steps, total : ndarray, shape (n,)
@@ -271,13 +263,13 @@ class PPOState(TrainingState):
     Parameters
     ----------
     parameters : ndarray of float32, shape (n_parameters,)
-        Parameters of actor and critic, in the order of the policy of Stable-Baselines3.
+        Parameters of actor and critic, in the order of Stable-Baselines3.
     first_moment, second_moment : ndarray of float32, shape (n_parameters,)
         Adam's running means of the gradients and of their squares.
     normalizer : Normalizer
-        Statistics by which observations are normalised.
+        Statistics that normalise observations.
     episodes : EpisodeStates
-        The episodes that are under way.
+        The running episodes.
     failed : FailedScenarios
         What may be replayed.
     simulator_time : float

@@ -1,4 +1,4 @@
-"""The arms of a training: how their episodes begin and end, and rollouts of the actor in them."""
+"""The arms of a training, their episodes, and rollouts of the actor."""
 
 import time
 
@@ -16,11 +16,11 @@ from kinarm.policies.ppo.networks import ActorCritic
 
 
 class TrainingArms:
-    """Arms that are stepped together, whose episodes are replaced when they end.
+    """Arms stepped together, whose episodes are replaced when they end.
 
-    With a mirror, new scenarios with goals to the left are reflected, so that a learner only ever
-    meets goals to the right. To stop at the goal, a success takes two steps in a row within the
-    tolerance.
+    With a mirror, new goals on the left are reflected, so that a learner only
+    meets those on the right. To stop at the goal, a success takes two steps in
+    a row within the tolerance.
 
     Parameters
     ----------
@@ -32,10 +32,11 @@ class TrainingArms:
     failed : FailedScenarios
         What may be replayed.
     returns, successes : list of ndarray
-        Of the episodes that ended since `restore`, but for those that replayed a failed scenario.
+        Of episodes that ended since `restore`, but for replays.
     cut_short, finals : list of ndarray
-        Of each step since `restore`, the rows of the episodes that the time limit cut short, shape
-        (n,), and their last observations, shape (n, n_observations).
+        Of each step since `restore`, rows of episodes that the time limit cut
+        short, shape (n,), and their last observations, shape (n,
+        n_observations).
     time : float
         Time that steps took since `restore` [s].
     """
@@ -46,14 +47,14 @@ class TrainingArms:
         self.mirror = problem_mirror(config.problem) if config.symmetric else None
 
     def reach_within(self, tolerance: float) -> None:
-        """Count this distance [m] as a success in episodes that are restored from now on."""
+        """Count this distance [m] as a success in episodes restored later."""
         if tolerance != self.simulator.task.tolerance:
             self.simulator = self.simulator.with_tolerance(tolerance)
 
     def sample(
         self, rng: np.random.Generator, count: int, start_spread: float | None = None
     ) -> StartsAndGoals:
-        """Draw starts and goals as a learner meets them, without replay.
+        """Draw starts and goals without replay.
 
         Parameters
         ----------
@@ -64,7 +65,7 @@ class TrainingArms:
         return drawn if self.mirror is None else self.mirror.scenarios_from_the_right(*drawn)
 
     def restore(self, state: PPOState, rng: np.random.Generator) -> None:
-        """Go on with the episodes of a state; the generator draws those that follow."""
+        """Go on with a state's episodes; the generator draws later ones."""
         config, done = self.config, state.iteration / self.config.iterations
         self._rng, self._start_spread = rng, config.start_spread_at(done)
         self._remitted = 1.0 - config.penalty_at(done)
@@ -81,7 +82,7 @@ class TrainingArms:
         self.finals: list[Numbers] = []
 
     def states(self) -> EpisodeStates:
-        """Copy what the running episodes depend on."""
+        """Copy the state of running episodes."""
         episodes, ours = self.episodes, (self._total, self._start, self._replayed)
         parts = (episodes.q, episodes.goal, episodes.steps, *ours)
         return EpisodeStates._make(map(np.copy, parts))
@@ -94,14 +95,14 @@ class TrainingArms:
         return ((observations - self._mean) * self._scale).astype(np.float32)
 
     def replaying(self) -> NDArray[np.bool_]:
-        """Which arms are in those steps of a replay that have more noise, shape (n_envs,)."""
+        """Which arms have the noise of replays, shape (n_envs,)."""
         steps = self.config.replay_noise_steps
         return self._replayed if steps is None else self._replayed & (self.episodes.steps < steps)
 
     def step(self, actions: Numbers) -> tuple[Numbers, NDArray[np.bool_]]:
-        """Move all arms by actions, shape (n_envs, n_actions), and renew episodes that end.
+        """Move arms by actions, shape (n_envs, n_actions); renew ended episodes.
 
-        Returned are the rewards, and which episodes ended, shape (n_envs,) each.
+        Returns rewards, and which episodes ended, shape (n_envs,) each.
         """
         began, episodes, task = time.perf_counter(), self.episodes, self.simulator.task
         passes = np.zeros(len(episodes.steps), dtype=bool)
@@ -127,7 +128,7 @@ class TrainingArms:
         return rewards.astype(np.float32), ended
 
     def _renew(self, rows: NDArray[np.int64], missed: NDArray[np.bool_]) -> None:
-        """Replace episodes; those that missed the goal may be replayed."""
+        """Replace episodes; missed ones may be replayed."""
         config, episodes = self.config, self.episodes
         if config.replay_share:
             scenarios = self._start[missed], episodes.goal[missed]
@@ -153,10 +154,10 @@ def collect(
     gamma: float,
     threads: int,
 ) -> Experience:
-    """Step the arms, and judge their steps at the end, all at once.
+    """Step the arms, then judge all steps at once.
 
-    An episode that the time limit ended would have gone on: its last reward gets the value of its
-    last observation.
+    An episode that the time limit cut short would go on: its last reward gets
+    the value of its last observation.
 
     Parameters
     ----------
@@ -192,7 +193,7 @@ def collect(
     values = values[:end].reshape(-1, config.n_envs)
     advantages = estimate_advantages(rewards, values, going_on, gamma, config.gae_lambda)
     parts = (observations, actions, scales, densities, advantages, advantages + values[:-1])
-    # Arm after arm, as Stable-Baselines3 has them.
+    # Arm after arm, as in Stable-Baselines3.
     return Experience(*(part.swapaxes(0, 1).reshape(-1, *part.shape[2:]) for part in parts))
 
 
@@ -204,9 +205,9 @@ def estimate_advantages(
     Parameters
     ----------
     rewards, going_on : ndarray of float32, shape (n_steps, n_envs)
-        ``going_on`` is 0 where an episode ended in the step, else 1.
+        ``going_on`` is 0 where an episode ended, else 1.
     values : ndarray of float32, shape (n_steps + 1, n_envs)
-        Values of the observations before each step and after the last one.
+        Values before each step and after the last one.
     gamma, gae_lambda : float
         Discount per step, and decay of the estimate.
     """

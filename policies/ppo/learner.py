@@ -26,13 +26,13 @@ IMITATING = "learning from the oracle's motions first"
 """Told before a training that begins with demonstrations."""
 
 NORMALIZED_OVER = 10_000
-"""Random starts whose observations are the statistics of the normaliser."""
+"""Random starts whose observations the normaliser describes."""
 
 
 def seed_iteration(seed: int, iteration: int) -> tuple[np.random.Generator, np.random.Generator]:
-    """Give an iteration its own random numbers, which do not depend on where the training began.
+    """Give an iteration random numbers of its own, so that trainings can resume.
 
-    The first generator is for the learner, the second one for scenarios.
+    One generator is for the learner, one for scenarios.
     """
     learner = stream_generator(Stream.PPO_LEARNER, seed, iteration)
     return learner, stream_generator(Stream.PPO_SCENARIOS, seed, iteration)
@@ -48,8 +48,8 @@ class PPOTraining:
     tensorboard : str or Path, optional
         Folder of the logs.
     threads : int, optional
-        Threads of an update, on which the result does not depend; as many as there are processors
-        by default.
+        Threads of an update; by default as many as processors. The result does
+        not depend on them.
     """
 
     def __init__(
@@ -97,7 +97,7 @@ class PPOTraining:
             return replace(state, parameters=self._taught(state))
 
     def _taught(self, state: PPOState) -> NDArray[np.float32]:
-        """Parameters of an actor that has imitated motions of the oracle."""
+        """Parameters of an actor that has imitated the oracle."""
         config, arms, networks = self.config, self.arms, self.networks
         rng = stream_generator(Stream.PPO_DEMONSTRATIONS, config.seed)
         arms.reach_within(config.tolerance_at(0.0))

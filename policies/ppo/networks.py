@@ -1,4 +1,4 @@
-"""Actor and critic: parameters in one vector, in the kernels, and as a policy."""
+"""Actor and critic: in one vector, in the kernels, and as a policy."""
 
 from collections.abc import Sequence
 from itertools import pairwise
@@ -16,10 +16,10 @@ from kinarm.policies.ppo.kernels.layers import BLOCK, Network, Numbers, evaluate
 from kinarm.policies.provenance import Provenance
 
 STEPS_A_ROW = 8
-"""Work of passing an observation through a network, in steps of an episode."""
+"""Work of a network per observation, in steps of an episode."""
 
 HIDDEN_GAIN, ACTOR_GAIN, CRITIC_GAIN = 2.0**0.5, 0.01, 1.0
-"""Factors of orthogonal initial weights, as Stable-Baselines3 chooses them."""
+"""Factors of orthogonal initial weights, as in Stable-Baselines3."""
 
 Vector = NDArray[Any]
 Affine = tuple[Vector, Vector]
@@ -27,7 +27,7 @@ Affine = tuple[Vector, Vector]
 
 
 class Parameters(NamedTuple):
-    """Parts of a vector: logarithms of the deviations of actions, and layers."""
+    """Parts of a vector: logarithms of the deviations, and layers."""
 
     log_std: Vector
     actor: list[Affine]
@@ -37,7 +37,7 @@ class Parameters(NamedTuple):
 def _shapes(widths: Sequence[int]) -> list[tuple[int, int]]:
     """Inputs and outputs of all layers, in the order of Stable-Baselines3.
 
-    These are the hidden layers of actor and critic, then the last ones.
+    Hidden layers of actor and critic come first, then the last ones.
     """
     *hidden, last = pairwise(widths)
     return [*hidden, *hidden, last, (widths[-2], 1)]
@@ -49,9 +49,9 @@ def _count(widths: Sequence[int]) -> int:
 
 
 def split_parameters(vector: Vector, widths: Sequence[int]) -> Parameters:
-    """Take a vector apart, whose parts are then views of it.
+    """Take a vector apart, into views of it.
 
-    The standard deviations come first; of every layer, the weights.
+    Standard deviations come first, and weights before biases.
 
     Parameters
     ----------
@@ -76,7 +76,7 @@ def split_parameters(vector: Vector, widths: Sequence[int]) -> Parameters:
 def initial_parameters(
     rng: np.random.Generator, widths: Sequence[int], log_std: float
 ) -> NDArray[np.float32]:
-    """Draw parameters as Stable-Baselines3 does: orthogonal weights, and biases of zero.
+    """Draw orthogonal weights and zero biases, as Stable-Baselines3 does.
 
     Parameters
     ----------
@@ -98,14 +98,14 @@ def initial_parameters(
 
 
 def orthogonal(normal: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Make the columns, or the rows if there are fewer, of a matrix orthonormal one by one.
+    """Make columns, or rows if there are fewer, of a matrix orthonormal.
 
-    Of a matrix of normal numbers it makes a matrix that is as likely as any of its rotations. The
-    sums are taken in a fixed order, not by BLAS, whose order depends on the processor.
+    Of normal numbers it makes any rotation equally likely. Sums have a fixed order, unlike those of
+    BLAS.
     """
     tall = normal.shape[0] >= normal.shape[1]
     found = (normal.T if tall else normal).copy()
-    for k, row in enumerate(found):  # subtract what earlier rows hold of it (Gram and Schmidt)
+    for k, row in enumerate(found):  # Gram and Schmidt
         for _ in range(2):  # once more, against rounding
             along = (found[:k] * row).sum(axis=1)
             row -= (along[:, None] * found[:k]).sum(axis=0)
@@ -114,7 +114,7 @@ def orthogonal(normal: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 class ActorCritic:
-    """The networks of actor and critic, whose parameters lie in one array.
+    """Actor and critic, whose parameters lie in one array.
 
     Parameters
     ----------
@@ -124,8 +124,8 @@ class ActorCritic:
     Attributes
     ----------
     weights : ndarray of float32, shape (n_weights,)
-        The parameters: matrices (inputs x outputs) and biases, their rows padded with zeros, and
-        the logarithms of the standard deviations.
+        Matrices (inputs x outputs) and biases, their rows padded with zeros,
+        and the logarithms of the standard deviations.
     actor, critic : Network
         The networks.
     log_std : ndarray of float32, shape (n_actions,)
@@ -134,9 +134,8 @@ class ActorCritic:
 
     def __init__(self, widths: Sequence[int]) -> None:
         self.n_parameters, n_actions = _count(widths), widths[-1]
-        every = np.arange(self.n_parameters)
-        numbers = split_parameters(every, widths)
-        self._places = np.zeros_like(every)
+        numbers = split_parameters(np.arange(self.n_parameters), widths)
+        self._places = np.zeros(self.n_parameters, dtype=np.int64)
         tables, end, turned = [], 0, 0
         for layers in (numbers.actor, numbers.critic):
             table, end, turned = self._place(layers, end, turned)
@@ -152,7 +151,7 @@ class ActorCritic:
     def _place(
         self, layers: list[Affine], first: int, turned: int
     ) -> tuple[NDArray[np.int64], int, int]:
-        """Lay out a network behind what lies in the arrays already; returns their new ends."""
+        """Lay out a network behind earlier ones; returns new ends of the arrays."""
         rows, inputs = [], 0
         for weights, bias in layers:
             n_out, n_in = weights.shape
@@ -197,7 +196,7 @@ class ActorCritic:
 
 
 def actor_policy(config: PPOConfig, state: PPOState) -> Policy:
-    """Freeze the actor of a state into a policy, which takes its mean action."""
+    """Freeze the actor of a state into a policy of mean actions."""
     parameters = state.parameters.astype(np.float64)
     actor = split_parameters(parameters, layer_widths(config.problem, config.net_arch)).actor
     return Policy(

@@ -1,8 +1,7 @@
-"""An update of actor and critic: some epochs of steps of Adam, each by a minibatch.
+"""Updates of actor and critic by Adam, and imitation of the oracle.
 
-Before a training, an actor may imitate the oracle. Reinforcement spends most of its steps on
-finding the goals at all, and the oracle's motions show where they are. Imitation alone reaches far
-fewer goals than what follows: it never sees where its own errors lead.
+An actor may imitate the oracle first, since reinforcement spends most steps on finding the goals at
+all. Imitation alone reaches far fewer goals: it never sees where its own errors lead.
 """
 
 from typing import Any, NamedTuple
@@ -32,14 +31,14 @@ from kinarm.policies.ppo.networks import ActorCritic
 from kinarm.simulator import Simulator
 
 PARTS = 8
-"""Parts of a minibatch whose gradients are found independently of each other."""
+"""Parts of a minibatch whose gradients are found independently."""
 
 ADAM = {"first_decay": 0.9, "second_decay": 0.999, "epsilon": 1e-5}
-"""Settings of Adam, as Stable-Baselines3 chooses them."""
+"""Settings of Adam, as in Stable-Baselines3."""
 
 
 class UpdateRecords(NamedTuple):
-    """Means over each minibatch, for logs; arrays of shape (n_minibatches,)."""
+    """Means over each minibatch, for logs, shape (n_minibatches,)."""
 
     policy_loss: NDArray[np.float64]
     value_loss: NDArray[np.float64]
@@ -59,13 +58,13 @@ def update(
 ) -> UpdateRecords:
     """Change networks and moments by the experience of a rollout.
 
-    A minibatch is split into parts whose gradients are added up in a fixed order, so that the
-    result does not depend on the number of threads.
+    Gradients of parts are added up in a fixed order, so that the result does
+    not depend on threads.
 
     Parameters
     ----------
     config, iteration : PPOConfig and int
-        Settings, and how many updates there were before.
+        Settings, and number of earlier updates.
     networks : ActorCritic
         What is trained.
     moments : tuple of ndarray of float32
@@ -99,14 +98,14 @@ def update(
 def logged(
     config: PPOConfig, point: CurvePoint, records: UpdateRecords, experience: Experience
 ) -> dict[str, float]:
-    """Entries of a log by name, which are those of Stable-Baselines3.
+    """Entries of a log, with the names of Stable-Baselines3.
 
     Parameters
     ----------
     config : PPOConfig
         The settings.
     point, records, experience
-        What an iteration came to.
+        Results of an iteration.
     """
     n_actions, minibatches = experience.actions.shape[1], len(records.log_std) // config.n_epochs
     entropy = n_actions * (records.log_std + 0.5 + HALF_LOG_2_PI)
@@ -127,10 +126,10 @@ def logged(
 
 
 def find_gradients(threads: int, *given: Any) -> None:
-    """Call ``add_gradients(part, part + 1, *given)`` for each of `PARTS` parts, on several threads.
+    """Call ``add_gradients(part, part + 1, *given)`` for `PARTS` parts, on threads.
 
-    The calling thread works, too, and never waits for one that has not begun: where processors
-    are busy with something else, it does all by itself.
+    The calling thread works, too, and does not wait for one that has not begun:
+    processors may be busy.
 
     Parameters
     ----------
@@ -142,7 +141,7 @@ def find_gradients(threads: int, *given: Any) -> None:
     if threads == 1:
         add_gradients(0, PARTS, *given)
         return
-    parts = iter(range(PARTS))  # whose next number only one thread gets: it holds the GIL
+    parts = iter(range(PARTS))  # each number goes to one thread: it holds the GIL
 
     def work(*_: object) -> int:
         for part in parts:
@@ -153,17 +152,17 @@ def find_gradients(threads: int, *given: Any) -> None:
 
 
 EPOCHS = 30
-"""How often imitation uses each step of the motions."""
+"""How often imitation uses each step."""
 
 BATCH_SIZE = 512
 """Steps per gradient step."""
 
 LEARNING_RATE = 1e-3
-"""Step size of Adam at the beginning; it falls linearly to zero."""
+"""Initial step size of Adam; it falls linearly to zero."""
 
 
 class Demonstrations(NamedTuple):
-    """Steps of motions of the oracle: what was seen and done, one row a step."""
+    """What was seen and done in motions of the oracle, one row a step."""
 
     observations: NDArray[np.float64]
     actions: NDArray[np.float64]
@@ -172,7 +171,7 @@ class Demonstrations(NamedTuple):
 def demonstrate(
     simulator: Simulator, scenarios: StartsAndGoals, threads: int | None = None
 ) -> Demonstrations:
-    """Let the oracle solve scenarios; those that it does not solve are left out.
+    """Let the oracle solve scenarios; unsolved ones are left out.
 
     Parameters
     ----------
@@ -202,14 +201,14 @@ def imitate(
     rng: np.random.Generator,
     threads: int,
 ) -> None:
-    """Change the actor so that its means come close to the actions; the critic stays as it is.
+    """Change the actor so that its means come close to the actions shown.
 
     Parameters
     ----------
     networks : ActorCritic
-        Networks, of which the actor is changed.
+        Networks, whose actor is changed.
     demonstrations, normalizer
-        What is imitated, and how observations are normalised.
+        What is imitated, and statistics that normalise observations.
     rng : numpy.random.Generator
         Draws minibatches.
     threads : int
@@ -231,5 +230,4 @@ def imitate(
             find_gradients(threads, *nets, *arrays)
             done = (epoch * batches + number) / (EPOCHS * batches)
             descent = Descent(LEARNING_RATE * (1 - done), 0.9, 0.999, 1e-8, 1e9)
-            steps = epoch * batches + number + 1
-            descend(*nets, *moments, gradients, descent, steps)
+            descend(*nets, *moments, gradients, descent, epoch * batches + number + 1)

@@ -1,4 +1,4 @@
-"""Algorithms of Stable-Baselines3 and sb3-contrib, for the registry of learners."""
+"""Algorithms of Stable-Baselines3 and sb3-contrib as learners."""
 
 import tomllib
 from dataclasses import dataclass, field
@@ -18,7 +18,7 @@ ALGORITHMS = {
     "tqc": ("sb3_contrib", "TQC", "Truncated Quantile Critics"),
     "trpo": ("sb3_contrib", "TRPO", "Trust Region Policy Optimization"),
 }
-"""Package, class and title of each algorithm, by the name of the learner."""
+"""Package, class and title of each algorithm, by learner."""
 
 
 def hyperparameters_of(text: str) -> dict[str, Any]:
@@ -46,19 +46,20 @@ class SB3Config(TrainingConfig):
     n_envs : int
         Arms that are simulated at once.
     training_tolerance : float, optional
-        Distance at which an episode of the training counts as a success [m]. It is the task's
-        tolerance if it is not given.
+        Distance that counts as a success in the training [m]; by default the
+        task's tolerance.
     hindsight : bool
-        Whether it learns from the goal-conditioned environment with hindsight replay.
+        Whether it learns in the goal-conditioned environment, with hindsight
+        replay.
     normalize : bool
-        Whether observations are normalised by their running statistics.
+        Whether running statistics normalise observations.
     action_noise : float
-        Standard deviation of noise that is added to the actions in training.
+        Standard deviation of noise added to actions in training.
     learning_rate_schedule : {"constant", "linear"}
         Whether the learning rate stays or falls linearly to zero.
     hyperparameters : dict
-        Arguments of the algorithm's class, as in TOML; the library's defaults stand for the
-        others.
+        Arguments of the algorithm's class, as in TOML; others have the
+        library's defaults.
     """
 
     algorithm: str
@@ -90,9 +91,9 @@ class SB3Config(TrainingConfig):
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class SB3State(TrainingState):
-    """How far a training is; everything else follows from repeating it up to there.
+    """How far a training is; repeating it gives everything else.
 
-    The training itself, where it is there already, is not in checkpoints.
+    The running training, if any, is not in checkpoints.
     """
 
     training: Any = field(default=None, repr=False, metadata={"unsaved": True})

@@ -34,24 +34,27 @@ def sb3_vec_env(
     camera: Any = None,
     **overrides: Any,
 ) -> "SB3VecEnv":
-    """Make a batch of arms that every learner of Stable-Baselines3 takes as its ``env``.
+    """Make a batch of arms as the ``env`` of a learner of Stable-Baselines3.
 
-    Arm i goes through the same episodes as the single environment with the seed + i.
+    Arm i has the episodes of the single environment with the seed + i.
 
     Parameters
     ----------
     problem : ReachProblem, str or Path
         As for `kinarm.ReachEnv`; or the id of an environment, such as
-        ``"kinarm/ReachRight-v0"`` or, goal-conditioned, ``"kinarm/ReachGoalRight-v0"``.
+        ``"kinarm/ReachRight-v0"`` or, goal-conditioned,
+        ``"kinarm/ReachGoalRight-v0"``.
     n_envs, seed : int
-        Number of arms, and seed of the episodes; a learner's own ``seed`` replaces it.
+        Number of arms, and seed, which a learner's own ``seed`` replaces.
     observation_dtype, reward_type : str, optional
-        As for `kinarm.ReachGoalEnv`; a reward type makes any problem goal-conditioned.
+        As for `kinarm.ReachGoalEnv`; a reward type makes any problem
+        goal-conditioned.
     threads : int, optional
         As for `kinarm.Simulator`.
     replay_share, replay_size : float and int
-        Probability that an episode begins where one of the last ``replay_size`` failures did;
-        infos tell which did (``replayed``). Evaluate policies in an environment without.
+        Probability that an episode begins where one of the last ``replay_size``
+        failures did, told by infos (``replayed``). Evaluate policies without
+        it.
     render_mode, width, height, camera
         As for `kinarm.ReachEnv`.
     **overrides
@@ -78,7 +81,7 @@ def sb3_vec_env(
 
 
 def _single_environment(problem: ProblemLike, settings: dict[str, Any]) -> "ReachEnv":
-    """The single environment that the batch multiplies."""
+    """The single environment of the batch."""
     from kinarm.envs import ReachEnv, ReachGoalEnv
 
     name = str(problem).rpartition(":")[2]
@@ -93,12 +96,13 @@ def _single_environment(problem: ProblemLike, settings: dict[str, Any]) -> "Reac
 
 
 def zoo_hyperparameters(algorithm: str) -> Path:
-    """File that rl-zoo3 takes as ``--conf-file``, with an entry for each of kinarm's environments.
+    """File that rl-zoo3 takes as ``--conf-file``, with kinarm's environments.
 
     Parameters
     ----------
     algorithm : str
-        As rl-zoo3 names it: ``"ppo"``, ``"a2c"``, ``"sac"``, ``"td3"`` or ``"tqc"``.
+        As rl-zoo3 names it: ``"ppo"``, ``"a2c"``, ``"sac"``, ``"td3"`` or
+        ``"tqc"``.
 
     Raises
     ------

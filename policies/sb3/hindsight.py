@@ -15,15 +15,14 @@ Goals = NDArray[np.floating[Any]]
 class HindsightReplayBuffer(HerReplayBuffer):
     """A ``HerReplayBuffer`` that ends an episode where it reaches a substituted goal.
 
-    The buffer of Stable-Baselines3 computes the reward for the substituted goal, but keeps the end
-    of the episode from the original one. In `kinarm.ReachGoalEnv` reaching the goal ends an
-    episode. A learner with that buffer would bootstrap a value after the goal, where nothing
-    comes. This buffer also keeps the part of a reward that does not depend on the goal, such as
-    the penalty for a collision, without ``copy_info_dict``.
+    In `kinarm.ReachGoalEnv` reaching the goal ends an episode. The buffer of Stable-Baselines3
+    keeps the original end, so that a learner would bootstrap a value after the goal, where nothing
+    comes. This buffer also keeps the part of a reward that does not depend on the goal, such as the
+    penalty for a collision, without ``copy_info_dict``.
     """
 
     def _sample_goals(self, batch_indices: Indices, env_indices: Indices) -> Goals:
-        """Goals to substitute, shape (n, 3) [m]; notes which other entries have to change."""
+        """Goals to substitute, shape (n, 3) [m]; notes which entries change."""
         goals: Goals = super()._sample_goals(batch_indices, env_indices)
         where = batch_indices, env_indices
         achieved = self.next_observations["achieved_goal"][where]
@@ -34,14 +33,14 @@ class HindsightReplayBuffer(HerReplayBuffer):
 
     def _ask(self, method: str, achieved: Goals, desired: Goals) -> NDArray[Any]:
         """Ask the environment about pairs of goals."""
-        environment: Any = self.env  # which every learner gives to its buffer
+        environment: Any = self.env  # given by every learner
         (answer,) = environment.env_method(method, achieved, desired, {}, indices=[0])
         return np.asarray(answer, dtype=np.float32)
 
     def _get_virtual_samples(
         self, batch_indices: Indices, env_indices: Indices, env: VecNormalize | None = None
     ) -> DictReplayBufferSamples:
-        """Transitions with substituted goals, which end where these are reached."""
+        """Transitions with substituted goals, which end where they are reached."""
         samples = super()._get_virtual_samples(batch_indices, env_indices, env)
         besides = self._normalize_reward(self._besides.reshape(-1, 1), env)
         reached = self.to_torch(self._reached).reshape(-1, 1)

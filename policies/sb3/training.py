@@ -1,9 +1,8 @@
-"""Training with an algorithm of Stable-Baselines3 or sb3-contrib, one step of all arms at a time.
+"""Training with an algorithm of Stable-Baselines3 or sb3-contrib, in steps.
 
-The algorithm's own ``learn`` runs in a thread that waits after every step, so that any algorithm
-can be evaluated in the course of its training. What an algorithm knows - replay buffer, optimisers,
-generators - cannot all be saved without pickle. A training therefore goes on by repeating what was
-done, which leads to the same bits.
+The algorithm's own ``learn`` runs in a thread that waits after every step, so that it can be
+evaluated meanwhile. Replay buffer, optimisers and generators cannot all be saved without pickle. A
+training therefore goes on by repeating what was done, to the same bits.
 """
 
 import threading
@@ -36,12 +35,12 @@ REPEATING = "repeating what was done before"
 """Told while a training repeats its beginning."""
 
 REFUSALS = (AssertionError, AttributeError, KeyError, RuntimeError, TypeError, ValueError)
-"""Errors of algorithms that cannot use a setting, or diverge."""
+"""Errors of algorithms that refuse a setting, or diverge."""
 
 
 @contextmanager
 def alone_in_torch() -> Iterator[None]:
-    """Keep torch to one thread, and put back the global generators that algorithms draw from."""
+    """Keep torch to one thread, and restore global generators afterwards."""
     threads, numpy_state = torch.get_num_threads(), np.random.get_state()  # noqa: NPY002
     with torch.random.fork_rng(devices=[]):
         torch.set_num_threads(1)
@@ -53,9 +52,9 @@ def alone_in_torch() -> Iterator[None]:
 
 
 class SteppedLearning:
-    """``model.learn`` in a thread of its own, which waits after every step of all arms.
+    """``model.learn`` in a thread, which waits after every step of all arms.
 
-    In the last step it does all that is left to do.
+    The last step does all that is left.
     """
 
     def __init__(self, model: BaseAlgorithm, steps: int) -> None:
@@ -67,7 +66,7 @@ class SteppedLearning:
         threading.Thread(target=self._learn, daemon=True).start()
 
     def step(self) -> None:
-        """Let it take one step; what the algorithm refuses is said in one line."""
+        """Let it take one step; refusals are said in one line."""
         self._may_go_on.release()
         self._has_stopped.acquire()
         if isinstance(self._error, REFUSALS):
@@ -83,15 +82,14 @@ class SteppedLearning:
     def _learn(self) -> None:
         self._may_go_on.acquire()
         torch.set_num_threads(1)
-        environment_steps = self._steps * self.model.n_envs
         try:
-            self.model.learn(environment_steps, callback=self._after_step)
-        except BaseException as error:  # which is raised where a step was asked for
+            self.model.learn(self._steps * self.model.n_envs, callback=self._after_step)
+        except BaseException as error:  # raised in `step`
             self._error = error
         self._has_stopped.release()
 
     def _after_step(self, *_: object) -> bool:
-        """Wait, unless it was the last step; returns whether to go on."""
+        """Wait, but after the last step; returns whether to go on."""
         self.taken += 1
         if self.taken < self._steps:
             self._has_stopped.release()
@@ -100,7 +98,7 @@ class SteppedLearning:
 
 
 class SB3Training:
-    """A training under way, on one thread; a state tells how far it is."""
+    """A training under way, on one thread."""
 
     def __init__(self, config: SB3Config) -> None:
         self.config = config
@@ -118,7 +116,7 @@ class SB3Training:
         return SB3State(training=self)
 
     def iterate(self, state: SB3State) -> SB3State:
-        """One step of all arms, and the updates that are due before it."""
+        """One step of all arms, and updates due before it."""
         model, began = self.model(state.iteration), time.perf_counter()
         self._step()
         episodes, successes = model.ep_info_buffer or (), model.ep_success_buffer or ()
@@ -133,7 +131,7 @@ class SB3Training:
         return SB3State(curve=(*state.curve, point), training=self)
 
     def model(self, iteration: int) -> BaseAlgorithm:
-        """The algorithm after an iteration, repeated unless it is just there."""
+        """The algorithm after an iteration, repeated if need be."""
         if self._done == iteration:
             return self._learning.model
         with doing(REPEATING):
@@ -145,7 +143,7 @@ class SB3Training:
         return self._learning.model
 
     def _step(self) -> None:
-        """Take a step with the generators of the algorithm."""
+        """Take a step with the algorithm's generators."""
         done, self._done = self._done, -1  # until the step is over: it may be interrupted
         with alone_in_torch():
             torch.set_rng_state(self._generators[0])

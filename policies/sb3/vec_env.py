@@ -20,14 +20,14 @@ from kinarm.simulator import Simulator
 
 
 class SB3VecEnv(Lifecycle, VecEnv):
-    """Many arms, stepped by one call of the simulator; made by `kinarm.policies.sb3_vec_env`.
+    """Arms stepped together; made by `kinarm.policies.sb3_vec_env`.
 
     An episode that ends is replaced at once.
 
     Parameters
     ----------
     single : ReachEnv
-        The environment of one arm, with the problem, observations and rewards of all.
+        The environment of one arm, with problem, observations and rewards.
     num_envs : int
         Number of arms.
     replay_share, replay_size : float and int
@@ -35,18 +35,18 @@ class SB3VecEnv(Lifecycle, VecEnv):
     threads : int, optional
         As for `kinarm.Simulator`.
     render_mode, **picture
-        As for `kinarm.ReachEnv`: mode, ``width``, ``height`` and ``camera`` of pictures.
+        As for `kinarm.ReachEnv`: mode, ``width``, ``height`` and ``camera``.
 
     Notes
     -----
-    The info of an episode that ended holds what Stable-Baselines3 and its wrappers look for:
-    ``terminal_observation``, ``TimeLimit.truncated``, ``is_success`` and what ``Monitor`` adds,
+    The info of an episode that ended holds what Stable-Baselines3 looks for:
+    ``terminal_observation``, ``TimeLimit.truncated``, ``is_success`` and, as of ``Monitor``,
     ``episode`` (return ``r``, length ``l``, time ``t`` since the environment was made [s]); besides
-    ``collision`` and ``distance`` [m], and with replay ``replayed``: whether the episode began
-    where an earlier one had failed. That of a move that was refused holds ``collision``. All other
-    infos are empty, which saves time.
+    ``collision``, ``distance`` [m] and, with replay, ``replayed``: whether it began where an
+    earlier one had failed. That of a refused move holds ``collision``. Other infos are empty, which
+    saves time.
 
-    The arms share this object and its interface, from which ``get_attr`` and ``env_method`` read.
+    The arms share this object and its interface, which ``get_attr`` and ``env_method`` ask.
     """
 
     def __init__(
@@ -78,20 +78,20 @@ class SB3VecEnv(Lifecycle, VecEnv):
 
     @property
     def failed(self) -> FailedScenarios:
-        """Scenarios of the last episodes that failed, which may be replayed."""
+        """Scenarios of the last failed episodes, for replay."""
         return self._failed
 
     def restore_failed(self, starts: ArrayLike, goals: ArrayLike) -> None:
-        """Replay the `failed` scenarios of an earlier environment, and none that failed in this.
+        """Replay the `failed` scenarios of an earlier environment instead.
 
-        A reset with a seed goes back to them: the same seed gives the same episodes again, also
-        where a learner seeds the environment later.
+        A reset with a seed goes back to them: the same seed gives the same
+        episodes.
 
         Parameters
         ----------
         starts, goals : array_like, shape (n, n_joints) and (n, 3)
-            Configurations [rad or m] and positions [m], the oldest first; the last ``replay_size``
-            are kept.
+            Configurations [rad or m] and positions [m], oldest first; the last
+            ``replay_size`` are kept.
         """
         if not self._share:
             raise InvalidInputError("failed scenarios need an environment with a replay_share")
@@ -100,7 +100,7 @@ class SB3VecEnv(Lifecycle, VecEnv):
         self._restored = self._failed
 
     def reset(self) -> Observations:
-        """Begin all episodes anew, with the seeds and options that were set before."""
+        """Begin all episodes anew, with the seeds and options set before."""
         self._check_open()
         for row, seed in enumerate(self._seeds):
             if seed is not None:
@@ -121,7 +121,7 @@ class SB3VecEnv(Lifecycle, VecEnv):
         return self.interface.observe(episodes.observation)
 
     def _draw(self, rows: NDArray[np.int64]) -> StartsAndGoals:
-        """Starts and goals of the next episodes of some arms."""
+        """Starts and goals of the next episodes."""
 
         def draw_new(new: NDArray[np.int64]) -> StartsAndGoals:
             starts, goals = np.empty(self._starts.shape), np.empty((self.num_envs, 3))
@@ -140,11 +140,11 @@ class SB3VecEnv(Lifecycle, VecEnv):
         self._pictures.begin(rows, episodes)
 
     def step_async(self, actions: NDArray[Any]) -> None:
-        """Take note of the actions, shape (num_envs, n_actions), for `step_wait`."""
+        """Keep the actions, shape (num_envs, n_actions), for `step_wait`."""
         self._actions = actions
 
     def step_wait(self) -> VecEnvStepReturn:
-        """Move every arm for one time step; observations are of new episodes where one ended."""
+        """Move every arm for one step; ended episodes show the next one's observation."""
         episodes = self.episodes
         result = self.simulator.step(episodes, self._actions)
         reward, terminated, truncated = self.interface.step_outcome(episodes, result)
@@ -190,7 +190,7 @@ class SB3VecEnv(Lifecycle, VecEnv):
         self._announce(episodes, rows)
 
     def render(self, mode: str | None = None) -> Any:
-        """Draw all arms side by side, as the render mode says; see `kinarm.ReachVectorEnv`."""
+        """Draw all arms side by side; see `kinarm.ReachVectorEnv`."""
         _ = self.episodes  # refuses if there are none
         if self.render_mode is None or mode not in (None, self.render_mode):
             return super().render(mode)
@@ -198,19 +198,19 @@ class SB3VecEnv(Lifecycle, VecEnv):
         return shown and shown.tiled
 
     def get_images(self) -> list[NDArray[np.uint8] | None]:
-        """One picture of each arm, shape (height, width, 3), if the mode is ``rgb_array``."""
+        """One picture of each arm, shape (height, width, 3), for ``rgb_array``."""
         if self.render_mode != "rgb_array":
             return [None] * self.num_envs
         _ = self.episodes  # refuses if there are none
         return list(self._pictures.render() or ())
 
     def close(self) -> None:
-        """Let go of what draws the arms; nothing can be done afterwards."""
+        """Let go of what draws the arms; nothing works afterwards."""
         self._pictures.close()
         self.closed = True
 
     def get_attr(self, attr_name: str, indices: VecEnvIndices = None) -> list[Any]:
-        """Value of an attribute of the environment or of its interface, repeated for every arm."""
+        """An attribute of the environment or its interface, for every arm."""
         owner = self if hasattr(self, attr_name) else self.interface
         return [getattr(owner, attr_name) for _ in self._get_indices(indices)]
 
@@ -235,7 +235,7 @@ class SB3VecEnv(Lifecycle, VecEnv):
         indices: VecEnvIndices = None,
         **method_kwargs: Any,
     ) -> list[Any]:
-        """The answer of a method of the interface, repeated for every arm.
+        """The answer of a method of the interface, for every arm.
 
         Parameters
         ----------
@@ -246,5 +246,5 @@ class SB3VecEnv(Lifecycle, VecEnv):
         return [result for _ in self._get_indices(indices)]
 
     def env_is_wrapped(self, wrapper_class: type, indices: VecEnvIndices = None) -> list[bool]:
-        """True for ``Monitor``, whose infos this environment writes; False for other wrappers."""
+        """True for ``Monitor`` alone, whose infos this environment writes."""
         return [issubclass(Monitor, wrapper_class) for _ in self._get_indices(indices)]

@@ -50,7 +50,11 @@ class TestReplace:
     @pytest.mark.parametrize(
         ("overrides", "error", "message"),
         [
-            ({"horizons": 3}, UnknownNameError, "setting of a problem 'horizons' .did you mean 'horizon'"),
+            (
+                {"horizons": 3},
+                UnknownNameError,
+                "setting of a problem 'horizons' .did you mean 'horizon'",
+            ),
             ({"reward": {"bonus": 1}}, UnknownNameError, "reward term 'bonus'; available: prog"),
             ({"tolerance": "wide"}, InvalidInputError, r"tolerance must be a number \[m\]"),
             ({"arm": "nope"}, UnknownNameError, "arm 'nope'; available: .*paper"),

@@ -190,7 +190,9 @@ class TestRefusals:
     """In one line that names the file; Pinocchio prints nothing of its own."""
 
     def test_unknown_name_lists_the_arms(self):
-        with pytest.raises(UnknownNameError, match="arm 'papier'; .*panda.*paper, .*urdf"):
+        with pytest.raises(
+            UnknownNameError, match="arm 'papier' .did you mean 'paper'.*panda.*paper, .*urdf"
+        ):
             Arm.load("papier")
 
     @pytest.mark.parametrize(

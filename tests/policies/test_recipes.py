@@ -137,7 +137,7 @@ class TestFile:
     @pytest.mark.parametrize(
         ("text", "words"),
         [
-            ("speed = 3", "mine.toml: unknown key 'speed' (did you mean 'seed'?); available: problem, reward, seed"),
+            ("speed = 3", "mine.toml: unknown key 'speed' .did you mean 'seed'"),
             ("iterations = 0", "mine.toml: iterations must be .* at least 1, got 0"),
             ("[reward]\nbonus = 1", "mine.toml: unknown key 'reward.bonus'; available: progress"),
             ("[reward]\ncollision = 2", "mine.toml: reward: .*rewards contact"),

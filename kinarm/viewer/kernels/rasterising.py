@@ -101,8 +101,8 @@ def draw_view(
 ) -> None:
     """Find the nearest front of a triangle at every sample.
 
-    Barycentric coordinates over the distance are linear in the picture (Olano and Greer, 1997), so
-    triangles behind the camera need no clipping.
+    Barycentric coordinates over the distance are linear in the picture (Olano
+    and Greer, 1997), so triangles behind the camera need no clipping.
 
     Parameters
     ----------
@@ -166,9 +166,11 @@ def draw_shadow(shadowed: Array, faces: NDArray[np.int64], depth: NDArray[np.flo
     Parameters
     ----------
     shadowed : ndarray, shape (n_vertices, 3)
-        Vertices for the sun: column and row of the shadow map, and how near the sun [m].
+        Vertices for the sun: column and row of the shadow map, and how near the
+        sun [m].
     faces, depth
-        ``faces`` of `Surfaces` and ``shadow`` of `Lights`, which is changed in place.
+        ``faces`` of `Surfaces` and ``shadow`` of `Lights`, which is changed in
+        place.
     """
     height, width = depth.shape
     for face in range(faces.shape[0]):

@@ -1,11 +1,9 @@
-"""How close the tool can come to a goal, and in how few steps: proof by branch and bound.
+"""How close the tool can come to a goal, and how soon, by branch and bound.
 
-A box of configurations is excluded when a lower bound of the distance over it exceeds what is asked
-for, and what such a bound excludes of it is cut off. Nor does a motion end where the arm touches
-something: on demand a box is excluded, too, if some pair of bodies is proven to overlap throughout
-it (`kinarm.policies.oracle.kernels.box_proofs`). A box that is not excluded is tried where the
-linear model of the arm comes closest to the goal, and halved. Several boxes of a search are
-examined side by side, in lanes.
+A box of configurations is excluded, or cut, where a lower bound of the distance exceeds what is
+asked for. On demand it is excluded, too, if some pair of bodies is proven to overlap throughout
+(`kinarm.policies.oracle.kernels.box_proofs`). Another box is tried where the linear model of the
+arm comes closest to the goal, and halved. Boxes are examined side by side, in lanes.
 """
 
 import math
@@ -32,13 +30,13 @@ from kinarm.policies.oracle.kernels.box_proofs import (
 )
 
 WAITING = 4096
-"""Boxes that can wait at a time; halving eight until they are too small takes fewer."""
+"""Boxes that can wait; halving eight until they are too small takes fewer."""
 
 SMALLEST = 1e-6
-"""How far the tool can move in a box that is not halved any more [m]."""
+"""How far the tool can move in the smallest box [m]."""
 
 ROUNDING = 1e-9
-"""By how much boxes and distances are enlarged to cover rounding [rad, m]."""
+"""Added to boxes and distances to cover rounding [rad, m]."""
 
 
 Boxes = Any
@@ -47,22 +45,22 @@ Boxes = Any
 
 @cache
 def layout(n: int, n_joints: int) -> Layout:
-    """Work space of a block of boxes of the first n joints: arrays of lanes, but for ``lever``.
+    """Work space for boxes of the first n joints: arrays of lanes, but for ``lever``.
 
-    `kinarm.kernels.lanes.as_numbers` views lanes with one axis more, that of the boxes.
+    `kinarm.kernels.lanes.as_numbers` adds an axis, that of the boxes.
     """
     shapes = {
-        # Lower and upper corner [rad or m], and the distance proven of the box [m]: what the stack
-        # holds of it in a row. Half-widths, and which share is left of it.
+        # A row of the stack: lower and upper corner [rad or m], and proven distance [m].
+        # Half-widths, and the share that is left.
         "box": (ONE, 2 * n + 1),
         "half": (n,),
         "share": (ONE,),
-        # Centre, and a configuration that may be close to the goal [rad or m]; their poses.
+        # Centre, and a configuration tried [rad or m]; their poses.
         **dict.fromkeys(("q", "tried"), (ONE, n_joints)),
         **dict.fromkeys(("poses", "between"), (n_joints + 1, Fixed(POSE))),
-        # Distances from the goal at the centre and where it is tried [m].
+        # Distances from the goal of these two [m].
         "distance": (Fixed(2),),
-        # Jacobians of the tool at the centre, and of a point of the arm [m/rad, or m/m].
+        # Jacobians of the tool and of a point of the arm [m/rad, or m/m].
         **dict.fromkeys(("jacobian", "turns"), (THREE, n)),
         # Vector from the goal to the tool; step, scale, slope, least and bend of `curved_bound`.
         "model": (Fixed(6), max(n, 3)),
@@ -76,7 +74,7 @@ def layout(n: int, n_joints: int) -> Layout:
 def within_steps(
     chain: Chain, start: Array, step_limit: Array, steps: int, lower: Array, upper: Array
 ) -> None:
-    """Fill in the corners of what the first joints can reach in some steps."""
+    """Fill in corners of what joints can reach in some steps."""
     for i in range(step_limit.shape[0]):
         reach = steps * step_limit[i] + ROUNDING
         lower[i] = max(chain.lower[i], start[i] - reach)
@@ -85,10 +83,9 @@ def within_steps(
 
 @inlined
 def halve(stack: Array, row: int, lane: int, boxes: Boxes) -> bool:
-    """Put the halves of a box from a lane into the stack, that with the point tried above.
+    """Put the halves of a lane's box into the stack, that of the point tried on top.
 
-    It is cut across the joint that can move the tool farthest in it. Returns whether it is large
-    enough.
+    It is cut across the joint that moves the tool farthest. Returns whether it is large enough.
     """
     lever, box = boxes.lever, as_numbers(boxes.box)
     n = lever.shape[0]
@@ -130,39 +127,42 @@ def search(
     stack: Array,
     block: Boxes,
 ) -> tuple[bool, int, float, float]:
-    """Search a box for the configuration that reaches a goal in the fewest steps, or is closest.
+    """Search a box for the configuration with the fewest steps to a goal, or the closest.
 
-    If the resolution is infinite, the search is for a configuration with the tool close enough to
-    the goal that takes the fewest steps from the start. Else it is for the one closest to the goal,
-    whose distance may exceed what is proven by the resolution.
+    With an infinite resolution, the search is for one close enough to the goal
+    in the fewest steps from the start. Else it is for the closest one, whose
+    distance may exceed what is proven by the resolution.
 
     Parameters
     ----------
     chain, bounds, shapes
         The arm, bounds of its motion, and what may touch.
     start, goal, step_limit
-        The arm's start, shape (n_joints,), the goal [m], and moves in a step, shape (n,).
+        The arm's start, shape (n_joints,), the goal [m], and moves in a step,
+        shape (n,).
     fewest, most : int
         Range of the steps.
     enough, resolution : float
-        Distances from the goal that is close enough, and that makes a difference [m].
+        Distance from the goal that is close enough, and difference that matters
+        [m].
     contact, budget : bool and int
-        Rule out what is proven to touch something; boxes after which the search is given up.
+        Whether to rule out what is proven to touch; boxes examined at most.
     lower, upper : ndarray, shape (n,)
-        The box of the first n joints [rad or m]. In a search for the fewest steps it is that of the
-        most, and shrinks with every configuration found that takes fewer.
+        The box of the first n joints [rad or m]; in a search for the fewest
+        steps, filled in, and smaller with every configuration found.
     best : ndarray, shape (n_joints,)
-        Where the configuration found goes; joints beyond the n-th stay as at the start.
+        Filled with the configuration found; joints beyond the n-th stay as at
+        the start.
     stack, block : ndarray, shape (WAITING, 2 n + 1), and Boxes
         Work space.
 
     Returns
     -------
     complete, steps : bool and int
-        Whether nothing better is proven to exist, and the steps of the configuration found; more
-        than ``most`` if there is none.
+        Whether it is proven that there is nothing better, and the steps of the
+        configuration found; more than ``most`` if there is none.
     distance, proven : float
-        That of the closest configuration found, and a lower bound over the box [m].
+        Of the closest configuration found, and a lower bound over the box [m].
     """
     n, n_joints = lower.shape[0], start.shape[0]
     box, half, lever = block.box, block.half, block.lever
@@ -185,12 +185,12 @@ def search(
         lever[i] = math.sqrt(lever[i]) if contact else lever[i]
         stack[0, i], stack[0, n + i], stack[0, 2 * n] = lower[i], upper[i], 0.0
     steps, closest, proven = most + 1, np.inf, np.inf
-    # Boxes are excluded beyond the cutoff. It falls with every closer configuration that is found:
-    # what is not closer by the resolution is of no interest.
+    # Boxes are excluded beyond the cutoff, which falls with every closer configuration found: what
+    # is not closer by the resolution does not matter.
     cutoff = enough + ROUNDING if fewer else np.inf
     waiting, examined, undecided = 1, 0, False
-    # Depth first: a stack of halves stays short, and leads straight to where the model expects the
-    # goal. What is found there lowers the cutoff, or the steps, for all boxes that wait.
+    # Depth first: the stack stays short, and leads straight to where the model expects the goal.
+    # What is found there lowers the cutoff, or the steps, for all boxes.
     while waiting > 0 and examined < budget and waiting + LANES < WAITING:
         if steps <= fewest if fewer else closest <= enough:
             break
@@ -199,7 +199,7 @@ def search(
             put(stack, waiting - 1 - min(lane, count - 1), box, 0, lane)
         waiting -= count
         examined += count
-        # Cut the boxes to what is still of interest, and find their centres.
+        # Cut the boxes to what still matters, and find their centres.
         narrowest = 0.0 * box[0, 0]
         for i in range(n):
             box[0, i] = max(box[0, i], lower[i])
@@ -207,7 +207,7 @@ def search(
             half[i] = 0.5 * (box[0, n + i] - box[0, i])
             block.q[0, i] = 0.5 * (box[0, n + i] + box[0, i])
             narrowest = min(narrowest, half[i])
-        # Nothing is left of a box that takes no fewer steps than what was found.
+        # Nothing is left of a box that takes no fewer steps.
         empty = narrowest < 0.0
         # Bound the distance over a box by a linear model at its centre and its curvature.
         block.distance[0] = offset_from_goal(chain, block.q, goal, block.poses, offset)
@@ -220,7 +220,7 @@ def search(
         for i in range(n):
             block.tried[0, i] = block.q[0, i] + step[i]
         block.distance[1] = offset_from_goal(chain, block.tried, goal, block.between, offset)
-        # Of centres and steps, those count that come closer than what was found, and are free.
+        # Those count that come closer than what was found, and are free.
         far = enough if fewer else closest
         at_centre = ~empty & (block.distance[0] <= far)
         at_step = ~empty & (block.distance[1] <= far)
@@ -259,11 +259,11 @@ def search(
         box[0, 2 * n] = max(box[0, 2 * n], bound)
         beyond = box[0, 2 * n] > cutoff
         if contact and any_lane(~beyond & ~empty):
-            # Contact comes last, since it asks about every pair. A box that touches something
-            # throughout holds no configuration that counts: nothing is to be proven of it.
+            # Contact comes last, since it asks about every pair. Of a box that touches something
+            # throughout, nothing is to be proven.
             work = (half, 1.0, turns)
             empty = empty | overlaps(~beyond & ~empty, chain, shapes, block.poses, *work)
-        # Leave out boxes that are decided, and put what is left of the others back, or halves.
+        # Put what is left of undecided boxes back, or their halves.
         excluded, gone = lane_bits(beyond), lane_bits(empty)
         for lane in range(count - 1, -1, -1):
             if gone >> lane & 1:
@@ -280,11 +280,11 @@ def search(
             elif halve(stack, waiting, lane, block):
                 waiting += 2
             else:
-                # Such boxes are left where bounds meet what is asked for, or proofs of contact end.
+                # Such boxes lie where bounds meet what is asked for, or proofs of contact end.
                 undecided = True
                 proven = min(proven, lower_bounds[0, 2 * n, lane])
     complete = (waiting == 0 and not undecided) or (steps <= fewest if fewer else closest <= enough)
-    # Of boxes that still wait, no more is known than of those that they are halves of.
+    # Boxes that still wait have the bounds of those that were halved.
     for i in range(waiting):
         proven = min(proven, stack[i, 2 * n])
     return complete, steps, closest, max(min(proven, closest) - ROUNDING, 0.0)

@@ -1,19 +1,20 @@
-"""Proofs for a box of configurations: how far the tool stays from a goal, and that the arm touches.
+"""Proofs for a box of configurations: distance from a goal, and contact.
 
-A box has a centre c and half-widths h. With any unit vector u, the tool p and the goal g,
+A box has a centre c and half-widths h. With any unit vector u, the tool p and
+the goal g,
 
     |p(c + e) - g|  >=  u . (p(c) - g) + sum_i u . J_i e_i + 1/2 sum_ij u . H_ij e_i e_j - R
 
-for all |e_i| <= h_i: the component along u is no longer than the vector, the Jacobian J and the
-second derivatives H say how the component changes, and R bounds what is of third order. A second
-bound needs no tool: the origin of the k-th joint moves no farther than its swing, and the tool is
-no farther from it than its length.
+for all |e_i| <= h_i, with the Jacobian J and the second derivatives H of the
+tool, and a bound R of what is of third order. A second bound needs no tool: the
+origin of the k-th joint moves no farther than its swing, and the tool is no
+farther from it than its length.
 
-Two points prove contact throughout a box, one of each body's axis, or of obstacle or ground, that
-stay closer than the radii however the arm moves in the box. Bodies that are only enclosed by a
-capsule prove nothing.
+Two points, of the axes of bodies or of obstacle or ground, prove contact
+throughout a box if they stay closer than the radii. Bodies that are only
+enclosed by a capsule prove nothing.
 
-All of it is free of branches on values, for a box or for one in each lane.
+No branch depends on values, so that lanes may hold a box each.
 """
 
 import math
@@ -34,12 +35,12 @@ SWEEPS = 3
 """Passes of the descent over the joints."""
 
 NEGLIGIBLE = 1e-12
-"""Length, and square of one, below which a vector has no direction to speak of [m, m^2]."""
+"""Length, or its square, below which a vector has no direction [m, m^2]."""
 
 
 @helper
 def offset_from_goal(chain: Chain, q: Array, goal: Vector, poses: Array, offset: Array) -> float:
-    """Fill in poses and the vector from the goal to the tool; return its length [m]."""
+    """Fill in poses and vector from goal to tool; return its length [m]."""
     tool = chain.tool
     forward_kinematics(chain, q, 0, poses)
     x, y, z = to_world(poses, q.shape[1], tool[0], tool[1], tool[2])
@@ -50,12 +51,12 @@ def offset_from_goal(chain: Chain, q: Array, goal: Vector, poses: Array, offset:
 
 @helper
 def joint_bound(bounds: MotionBounds, poses: Array, goal: Vector, half: Array) -> float:
-    """Lower bound of the distance over a box, from where the joints can be."""
+    """Lower bound of the distance over a box, by the joints."""
     swing, length = bounds.swing, bounds.length
     bound: float = 0.0 * half[0]
     for k in range(half.shape[0]):
         x, y, z = poses[k + 1, 13] - goal[0], poses[k + 1, 14] - goal[1], poses[k + 1, 15] - goal[2]
-        # Only the joints up to a joint move its origin; those beyond it are in its length.
+        # Only the joints up to it move its origin; its length covers the others.
         motion = 0.0 * half[0] + length[k]
         for i in range(k + 1):
             motion += half[i] * swing[i, k]
@@ -65,9 +66,9 @@ def joint_bound(bounds: MotionBounds, poses: Array, goal: Vector, half: Array) -
 
 @helper
 def closest_step(jacobian: Array, offset: Array, half: Array, step: Array, scale: Array) -> Vector:
-    """Fill in the e, |e_i| <= half_i, for which |offset + J e| is nearly least; return the vector.
+    """Fill in the e in the box that nearly minimises |offset + J e|; return the vector.
 
-    A descent, one joint at a time. It need not have converged: along any direction the bound holds.
+    A descent, one joint at a time. It need not converge: the bound holds along any direction.
     ``scale``, shape (n,), is work space.
     """
     n = half.shape[0]
@@ -75,7 +76,7 @@ def closest_step(jacobian: Array, offset: Array, half: Array, step: Array, scale
     for i in range(n):
         jx, jy, jz = jacobian[0, i], jacobian[1, i], jacobian[2, i]
         square = jx * jx + jy * jy + jz * jz
-        # A joint that does not move the tool, such as one through it, stays where it is.
+        # A joint that does not move the tool stays where it is.
         scale[i] = select(square > NEGLIGIBLE, 1.0 / square, 0.0)
         step[i] = 0.0
     for _ in range(SWEEPS):
@@ -93,14 +94,14 @@ def closest_step(jacobian: Array, offset: Array, half: Array, step: Array, scale
 def third_order(prismatic: NDArray[np.bool_], curvature: Array, half: Array) -> float:
     """Bound of what is of third order in a box [m].
 
-    A revolute joint turns the second derivatives by later joints, and its own, without making
-    them longer; a prismatic one leaves them alone.
+    A revolute joint turns its own second derivatives and those by later joints, at equal length; a
+    prismatic one leaves them alone.
     """
     n = half.shape[0]
     before = 0.0 * half[0]
     rest: float = 0.0 * half[0]
     for i in range(n):
-        # Of triples of joints in any order, six are the same if all differ, three if two do.
+        # Six orders of three joints are the same if all differ, three if two do.
         rest += curvature[i, i] * half[i] * half[i] * (0.5 * before + half[i] / 6.0)
         for j in range(i + 1, n):
             rest += curvature[i, j] * half[i] * half[j] * (before + 0.5 * half[i])
@@ -125,7 +126,7 @@ def curved_bound(
     """Lower bound of the distance over a box, along a direction.
 
     Filled in, shape (n,): the ``slope`` of each joint, the ``least`` that it adds to the bound, and
-    how far its motion may ``bend`` below its slope.
+    how far it may ``bend`` below its slope.
     """
     n = half.shape[0]
     x, y, z = direction
@@ -141,8 +142,8 @@ def curved_bound(
         size = abs(slope[i])
         least[i], bend[i] = -size * h, 0.0
         if not chain.prismatic[i]:
-            # The second derivative by a joint and a later one is the cross product of the axis of
-            # the one with the motion of the other.
+            # The second derivative by a joint and a later one is the cross product of the first
+            # one's axis with the other's motion.
             c, ax, ay, az = i + 1, chain.axis[i, 0], chain.axis[i, 1], chain.axis[i, 2]
             wx = poses[c, 4] * ax + poses[c, 5] * ay + poses[c, 6] * az
             wy = poses[c, 7] * ax + poses[c, 8] * ay + poses[c, 9] * az
@@ -173,10 +174,10 @@ def trim(
     lower: Array,
     upper: Array,
 ) -> float:
-    """Cut off what a box has beyond the cutoff; return which share of it is left.
+    """Cut off what is beyond the cutoff; return the share that is left.
 
-    Takes a bound of at most the cutoff, and what `curved_bound` filled in. With the other joints
-    wherever they add least, a joint alone may take the bound beyond the cutoff.
+    Takes a bound of at most the cutoff, and what `curved_bound` filled in. A joint is cut where the
+    bound exceeds the cutoff though all others add least.
     """
     share: float = 0.0 * half[0] + 1.0
     for i in range(half.shape[0]):
@@ -190,12 +191,12 @@ def trim(
 
 
 TRIED = 5
-"""Evenly spaced points of an axis that are tried for the deepest one, beside the closest one."""
+"""Evenly spaced points of an axis tried as the deepest, beside the closest."""
 
 
 @inlined
 def distance_from_box(beyond: Vector) -> float:
-    """Distance from a box, given how far a point is beyond it per axis; less than 0 within."""
+    """Distance from a box of a point so far beyond it per axis; negative within."""
     x, y, z = beyond
     farthest = max(max(x, y), z)
     x, y, z = max(x, 0.0), max(y, 0.0), max(z, 0.0)
@@ -204,7 +205,7 @@ def distance_from_box(beyond: Vector) -> float:
 
 @inlined
 def excess_over_box(point: Vector, lower: Vector, upper: Vector) -> Vector:
-    """How far a point is beyond a box, per axis; less than 0 between its faces."""
+    """How far a point is beyond a box, per axis; negative between its faces."""
     return (
         max(lower[0] - point[0], point[0] - upper[0]),
         max(lower[1] - point[1], point[1] - upper[1]),
@@ -224,7 +225,7 @@ def along(a: Vector, b: Vector, share: float) -> Vector:
 
 @inlined
 def deepest_share(a: Vector, b: Vector, lower: Vector, upper: Vector) -> float:
-    """Where on the segment ab it is deepest in a box, or closest to it: the best of a few."""
+    """Where the segment ab is deepest in a box, or closest: the best of a few."""
     share = closest_to_box(a, b, lower, upper)
     least = distance_from_box(excess_over_box(along(a, b, share), lower, upper))
     for k in range(TRIED):
@@ -237,7 +238,7 @@ def deepest_share(a: Vector, b: Vector, lower: Vector, upper: Vector) -> float:
 
 @inlined
 def axis_of(shapes: ContactShapes, i: int, poses: Array) -> tuple[Vector, Vector, float]:
-    """End points of a capsule's axis in the world, and half their distance."""
+    """End points of a capsule's axis in the world, and half its length."""
     axis = shapes.capsules[i]
     a, b = axis_in_world(shapes, i, poses)
     x, y, z = axis[3] - axis[0], axis[4] - axis[1], axis[5] - axis[2]
@@ -254,11 +255,10 @@ def overlaps(
     share: float,
     jacobian: Array,
 ) -> bool:
-    """Whether some pair of bodies is proven to touch throughout a box of configurations.
+    """Whether some pair of bodies is proven to touch throughout a box.
 
-    The box is centred where the ``poses`` are, with half-widths ``share`` times ``half``; a share
-    of 0 leaves its centre alone. Only what is ``wanted`` is examined. The Jacobian, shape (3, n),
-    is work space.
+    Its centre has the ``poses``, its half-widths are ``share`` times ``half``. Only what is
+    ``wanted`` is examined. The Jacobian, shape (3, n), is work space.
     """
     bodies, capsules, boxes, turns = shapes.bodies, shapes.capsules, shapes.boxes, shapes.turns
     prismatic, pairs, travel = chain.prismatic, shapes.pairs, shapes.travel
@@ -270,25 +270,25 @@ def overlaps(
             continue
         a, b, reach = axis_of(shapes, i, poses)
         middle = along(a, b, 0.5)
-        # What only just touches is left to Coal, whose iterations are no more precise.
+        # Coal, whose iterations are no more precise, decides what just touches.
         radius = capsules[i, 6] - MARGIN
         if kind == BETWEEN_CAPSULES:
             c, d, beyond = axis_of(shapes, j, poses)
             other, radius = along(c, d, 0.5), radius + capsules[j, 6]
             x, y, z = middle[0] - other[0], middle[1] - other[1], middle[2] - other[2]
-            # Most pairs are far apart at the centre already.
+            # Most pairs are far apart at the centre.
             reach += beyond + radius
             if not any_lane((x * x + y * y + z * z < reach * reach) & wanted & ~proven):
                 continue
             x, y, z = between_segments(a, b, c, d)
             gap = math.sqrt(x * x + y * y + z * z)
-            # No two points of the bodies move apart by more than the travel of the pair.
+            # No two points move apart by more than the travel of the pair.
             for axis in range(n):
                 gap += share * half[axis] * travel[axis, pair]
             proven = proven | (wanted & (gap < radius))
             continue
-        # A point deep in an obstacle stays in it longest. The ground is a box without end, of which
-        # the lower end of the segment is the deepest point.
+        # A point deep in an obstacle stays in it longest. In the ground, a box without end, the
+        # lower end of the segment is deepest.
         lower, upper = (-np.inf, -np.inf, -np.inf), (np.inf, np.inf, 0.0)
         first = a[2] < b[2]
         point = select(first, a[0], b[0]), select(first, a[1], b[1]), select(first, a[2], b[2])
@@ -307,8 +307,8 @@ def overlaps(
         x, y, z = excess_over_box(turned_back(point, cosine, sine), lower, upper)
         if not any_lane(wanted & ~proven & (distance_from_box((x, y, z)) < radius)):
             continue
-        # The point's motion along each edge to first order, by its Jacobian: an arm that
-        # slides along an obstacle does not leave it, however far it goes.
+        # The point's motion along each edge to first order: an arm that slides along an obstacle
+        # does not leave it.
         point_jacobian(chain, poses, point, jacobian)
         remainder = 0.0 * half[0]
         for axis in range(min(n, bodies[i, 2])):
@@ -318,8 +318,8 @@ def overlaps(
             x += width * abs(speed[0])
             y += width * abs(speed[1])
             z += width * abs(speed[2])
-            # The rest is of second order: a revolute joint turns its own motion, and that of every
-            # later joint, by its angle. A pair of joints counts once, a joint with itself by half.
+            # The rest is of second order: a revolute joint turns its own motion and that of every
+            # later joint. A pair of joints counts once, a joint with itself by half.
             if not prismatic[axis]:
                 later = 0.5 * width * travel[axis, pair]
                 for other_axis in range(axis + 1, min(n, bodies[i, 2])):

@@ -1,4 +1,4 @@
-"""Inverse kinematics: configurations moved until they bring the tool to a goal, within limits."""
+"""Inverse kinematics: configurations moved to goals, within limits."""
 
 import math
 from functools import cache
@@ -20,7 +20,7 @@ ITERATIONS = 24
 """Newton steps before a configuration is given up."""
 
 DAMPING = 1e-4
-"""Added to the diagonal of J J^T, which limits steps near singular configurations [m^2]."""
+"""Added to the diagonal of J J^T, to limit steps near singularities [m^2]."""
 
 
 Moving = Any
@@ -29,21 +29,21 @@ Moving = Any
 
 @cache
 def layout(n_joints: int, n: int) -> Layout:
-    """Configurations side by side in lanes, of which the first n joints move."""
+    """Configurations in lanes, of which the first n joints move."""
     shapes = {
         # Configurations, and their limits [rad or m].
         "q": (ONE, n_joints),
         **dict.fromkeys(("lower", "upper"), (ONE, n)),
-        # Goal, distance from it at which it is left, and where it is [m]; steps so far.
+        # Goal, distance at which to stop, and distance now [m]; steps so far.
         "goal": (ONE, THREE),
         **dict.fromkeys(("radius", "distance", "iteration"), (ONE,)),
-        # Forward kinematics, Jacobian of the tool [m/rad, or m/m], and the next step [rad or m].
+        # Poses, Jacobian of the tool [m/rad, or m/m], next step [rad or m].
         "poses": (n_joints + 1, Fixed(POSE)),
         "jacobian": (THREE, n),
         "step": (n,),
     }
     arrays = {name: (lanes, shape) for name, shape in shapes.items()}
-    # Which configurations are in the lanes.
+    # Rows of the configurations in the lanes.
     return Layout("Moving", {**arrays, "rows": (types.int64, (Fixed(LANES),))})
 
 
@@ -85,20 +85,21 @@ def damped_least_squares(
     configurations: Array,
     distances: Array,
 ) -> None:
-    """Move configurations until the tool is within a radius of the goal, by damped Newton steps.
+    """Move configurations to within a radius of goals, by damped Newton steps.
 
-    A row that has ended makes room in its lane for the next one.
+    A row that ends makes room for the next one.
 
     Parameters
     ----------
     first, last, moving, chain
         Range of the rows, work space, and the arm.
     owner, radius : ndarray, shape (n_rows,)
-        Row of goals and limits for each, and distance from the goal at which it is left [m].
+        Row of goals and limits for each, and distance at which to stop [m].
     lower, upper, goals : ndarray, shape (n_goals, n) twice and (n_goals, 3)
         Limits of the first n joints, the others stay [rad or m]; goals [m].
     configurations, distances : ndarray, shape (n_rows, n_joints) and (n_rows,)
-        Changed: joint positions [rad or m], and distances from the tool to the goal [m].
+        Changed: joint positions [rad or m], and distances from tool to goal
+        [m].
     """
     tool, rows = chain.tool, moving.rows
     n_joints, aim = configurations.shape[1], moving.goal[0]
@@ -123,7 +124,7 @@ def damped_least_squares(
                 free &= ~(1 << lane)
         if n_moving == 0:
             return
-        # Measure the distance to the goal, and take out what has come close enough.
+        # Measure the distance to the goal, and take out what is close enough.
         forward_kinematics(chain, moving.q, 0, poses)
         point = to_world(poses, n_joints, tool[0], tool[1], tool[2])
         x, y, z = aim[0] - point[0], aim[1] - point[1], aim[2] - point[2]
@@ -137,7 +138,7 @@ def damped_least_squares(
                 distances[rows[lane]] = found[0, lane]
                 n_moving -= 1
         free |= ended_bits
-        # Aimed at half the radius, a step that falls short still arrives. What has ended stays.
+        # Aimed at half the radius, a short step still arrives. What has ended stays.
         share = select(ended, 0.0, 1.0 - 0.5 * moving.radius[0] / distance)
         point_jacobian(chain, poses, point, jacobian)
         limits, blocked = (moving.lower[0], moving.upper[0]), True

@@ -1,7 +1,7 @@
 """Forward and backward passes of dense networks over a block of samples.
 
-Matrices are multiplied tile by tile, whose sums stay in vector registers. Loops over numbers run
-over slices from zero on: only then are they compiled to vectors.
+Matrices are multiplied tile by tile; sums stay in vector registers. Loops run over slices from zero
+on: only then are they compiled to vectors.
 """
 
 from collections.abc import Callable, Sequence
@@ -21,9 +21,9 @@ from kinarm.kernels.compiling import helper, inlined, kernel
 Numbers = NDArray[np.float32]
 
 LANES = 16
-"""Numbers of single precision that the widest vector registers hold."""
+"""Single-precision numbers in the widest vector registers."""
 ROWS = 8
-"""Rows of a tile: with two columns of vectors, its sums fill half of the widest registers."""
+"""Rows of a tile: with two columns of vectors, sums fill half the registers."""
 
 NUMBER, WORD = ir.FloatType(), ir.IntType(64)
 VECTOR = ir.VectorType(NUMBER, LANES)
@@ -33,7 +33,7 @@ Pointers = Callable[[Any, Any], Any]
 
 
 class Matrix(NamedTuple):
-    """A matrix in an array of numbers: where it begins, and how far apart rows and columns are."""
+    """A matrix in an array: where it begins, and strides of rows and columns."""
 
     numbers: Numbers
     first: int
@@ -42,7 +42,7 @@ class Matrix(NamedTuple):
 
 
 def _tile(columns: int) -> Any:
-    """Make a kernels' function for `ROWS` rows and so many columns, counted in vectors."""
+    """Make a function for tiles of `ROWS` rows and so many vectors."""
 
     @intrinsic
     def tile(
@@ -62,7 +62,7 @@ def _tile(columns: int) -> Any:
 
 
 def _pointers(context: Any, builder: Any, kind: Any, given: Any) -> Pointers:
-    """Make a function that gives pointers to entries of a `Matrix`, by row and column."""
+    """Make a function that returns pointers to entries of a `Matrix`."""
     numbers, first, *strides = (builder.extract_value(given, k) for k in range(4))
     array: Any = make_array(kind.types[0])
     data = array(context, builder, numbers).data
@@ -78,7 +78,7 @@ def _pointers(context: Any, builder: Any, kind: Any, given: Any) -> Pointers:
 
 
 def _multiply(builder: Any, columns: int, matrices: Sequence[Pointers], depth: Any) -> None:
-    """Emit the loop over the depth: in each round, a column of tiles times a row of vectors."""
+    """Emit the loop over the depth: a column of numbers times a row of vectors."""
     left, right, start, sink = matrices
 
     def vector(matrix: Pointers, row: Any, column: int) -> Any:
@@ -119,7 +119,7 @@ def multiply(
     rows, columns : int
         Size of ``sink``: multiples of `ROWS` and `LANES`.
     depth : int
-        How many products make up an entry; they are added one after the other.
+        How many products make up an entry; they are added in order.
     left, right, start, sink : Matrix
         The columns of all but ``left`` are adjacent.
     """
@@ -136,21 +136,21 @@ def multiply(
 
 
 BLOCK = 64
-"""Samples that pass through a network together; their activations stay in the cache."""
+"""Samples that pass together; their activations stay in the cache."""
 
 ONE = np.float32(1.0)
 
 N_IN, N_OUT, WEIGHTS, TURNED, INPUTS, OUTPUTS = range(6)
-"""Columns of a table of layers: widths, and where arrays begin."""
+"""Columns of a table of layers: widths and places."""
 
 
 class Network(NamedTuple):
     """A dense network with tanh between its layers.
 
     ``layers`` holds per layer its widths, and where its weights begin in ``weights`` (inputs x
-    outputs, then the bias) and, transposed, in ``turned``, and its inputs and outputs in a work
-    space. Rows of matrices and of values are padded with zeros to whole vectors. ``work`` is
-    the length of the work space, at least, and ``widest`` the largest padded width of a layer.
+    outputs, then the bias) and, transposed, in ``turned``, and values in a work space. Rows are
+    padded with zeros to whole vectors. ``work`` is the least length of the work space, ``widest``
+    the largest padded width.
     """
 
     layers: NDArray[np.int64]
@@ -168,7 +168,7 @@ def padded(width: int) -> int:
 
 @inlined
 def hyperbolic_tangent(x: np.float32) -> np.float32:
-    """Hyperbolic tangent, to within 5e-7: the rational function of Eigen and XLA."""
+    """Hyperbolic tangent to within 5e-7, as in Eigen and XLA."""
     bound = np.float32(7.90531110763549805)
     x = min(max(x, -bound), bound)
     z = x * x
@@ -186,9 +186,9 @@ def hyperbolic_tangent(x: np.float32) -> np.float32:
 
 @helper
 def forward(network: Network, rows: int, work: Numbers) -> None:
-    """Pass samples through all layers, whose inputs and outputs lie in a work space row by row.
+    """Pass samples through all layers, in rows of a work space.
 
-    The number of rows is a multiple of `ROWS`, at most `BLOCK`.
+    Their number is a multiple of `ROWS`, at most `BLOCK`.
     """
     layers, weights = network.layers, network.weights
     for layer in range(layers.shape[0]):
@@ -219,14 +219,14 @@ def backward(
     Parameters
     ----------
     network, rows, work
-        As for `forward`; derivatives by outputs replace the outputs: those of the network before,
-        those of the other layers here.
+        As for `forward`; derivatives replace outputs: those of the network
+        before the call, those of the other layers in it.
     samples : int
-        The first samples, which count.
+        The number of samples that count.
     behind : ndarray of float32
-        Work space for the widest layer, and one more row, of zeros.
+        Work space for the widest layer, and a row of zeros.
     gradient : ndarray of float32
-        Derivatives by the weights, to which those of the samples are added.
+        Derivatives by the weights; changed.
     """
     layers = network.layers
     for layer in range(layers.shape[0] - 1, -1, -1):
@@ -279,7 +279,7 @@ def evaluate(
     first, last : int
         Range of the rows.
     observations, outputs : ndarray of float32, shape (n, n_observations) and (n, n_out)
-        What it is given, and where its values go.
+        Inputs, and what is filled in.
     """
     layers = network.layers
     work = np.zeros(network.work, dtype=np.float32)

@@ -1,4 +1,4 @@
-"""The kernels that Python calls: actions of a rollout, and the steps of an update."""
+"""Kernels for the actions of a rollout and the steps of an update."""
 
 import math
 from typing import NamedTuple
@@ -25,17 +25,17 @@ from kinarm.policies.ppo.kernels.layers import (
 HALF_LOG_2_PI = 0.91893853320467274178
 
 MOST = 80.0
-"""Largest logarithm of a ratio of densities whose exponential is finite in single precision."""
+"""Largest logarithm of a ratio that is finite in single precision."""
 
 LOSSES = 4
-"""Sums over samples that are logged: policy loss, value loss, clipped ratios, divergence."""
+"""Logged sums: policy loss, value loss, clipped ratios, divergence."""
 
 
 class Experience(NamedTuple):
     """Experience of a rollout, one row a step.
 
-    Actions are not clipped. Scales tell by how much wider than usual the noise was with which they
-    were chosen, densities are the logarithms of its probability densities, over the scale.
+    Actions are not clipped. Scales tell by how much their noise was wider than usual, densities are
+    the logarithms of its probability densities, over the scale.
     """
 
     observations: Numbers
@@ -47,10 +47,10 @@ class Experience(NamedTuple):
 
 
 class Objective(NamedTuple):
-    """Weights of the loss of a minibatch (see `PPOConfig`), and of a sample in its means.
+    """Weights of the loss (see `PPOConfig`), and of a sample in its means.
 
-    Imitation has another loss: the squared error of the means of actions, of which no other part of
-    the experience is told.
+    The loss of imitation is the squared error of the means of actions; it needs nothing else of the
+    experience.
     """
 
     clip_range: float
@@ -61,7 +61,7 @@ class Objective(NamedTuple):
 
 
 class Descent(NamedTuple):
-    """Settings of Adam, and the largest norm of a gradient, to which longer ones are clipped."""
+    """Settings of Adam, and the norm to which gradients are clipped."""
 
     learning_rate: float
     first_decay: float
@@ -81,19 +81,19 @@ def choose(
     scales: Numbers,
     densities: Numbers,
 ) -> None:
-    """Turn noise into actions about their means, and find its densities.
+    """Turn noise into actions, and find its densities.
 
     Parameters
     ----------
     means, noise, actions : ndarray of float32, shape (n, n_actions)
-        What the actor says, standard normal numbers, and what is done.
+        What the actor says, standard normal numbers, and what is filled in.
     log_std : ndarray of float32, shape (n_actions,)
         Logarithms of the standard deviations.
     noisy, least : ndarray of bool, shape (n,), and float
-        Rows whose mean logarithm of the standard deviations is at least so large.
+        Rows where the mean logarithm is at least so large.
     scales, densities : ndarray of float32, shape (n,)
-        Factors on the standard deviations, and logarithms of the probability densities of the
-        deviations from the means over the scales.
+        Factors on the standard deviations, and logarithms of the densities of
+        the deviations over the scales.
     """
     precision = np.zeros(means.shape[1])
     find_precision(log_std, precision)
@@ -112,7 +112,7 @@ def choose(
 
 @kernel
 def standardisation(chosen: NDArray[np.int64], advantages: Numbers) -> tuple[float, float]:
-    """Mean of the advantages of a minibatch, and what then makes their standard deviation one."""
+    """Mean of the advantages, and factor that makes their deviation one."""
     total, squares = 0.0, 0.0
     for i in chosen:
         total += advantages[i]
@@ -136,21 +136,21 @@ def add_gradients(
     gradients: Numbers,
     losses: NDArray[np.float64],
 ) -> None:
-    """Find the gradient of the loss of a minibatch, in parts that do not depend on threads.
+    """Find the gradient of the loss of a minibatch, in fixed parts.
 
     Parameters
     ----------
     first, last : int
         Which parts.
     actor, critic : Network
-        Networks, whose parameters lie in one array; the logarithms of the standard deviations of
-        the actions are its last entries, padded.
+        Networks whose parameters lie in one array; its last entries, padded,
+        are the logarithms of the standard deviations.
     chosen : ndarray of int, shape (batch_size,)
         Rows of the minibatch.
     standard : tuple of float
-        What is subtracted from the advantages, and by what they are then multiplied.
+        Subtrahend and factor of the advantages.
     gradients, losses : ndarray, shape (n_parts, n_weights) and (n_parts, LOSSES)
-        Filled with the derivatives by the weights, and the sums that are logged.
+        Filled with derivatives by the weights, and logged sums.
     """
     n_parts, n_weights = gradients.shape
     n_actions = experience.actions.shape[1]
@@ -174,7 +174,7 @@ def add_gradients(
             for s in range(samples):
                 load_sample(experience.observations, rows[s], actor.layers, work, s)
             forward(actor, tiled, work)
-            # Replace means of actions by the derivatives of the clipped surrogate by them.
+            # Replace means of actions by derivatives of the clipped surrogate.
             for s in range(samples):
                 i, row = rows[s], mean_sink + s * padded(n_actions)
                 if objective.imitating:
@@ -205,14 +205,14 @@ def add_gradients(
             if objective.imitating:
                 continue
             forward(critic, tiled, work)
-            # Replace values by the derivatives of the squared error by them.
+            # Replace values by derivatives of the squared error.
             for s in range(samples):
                 row = value_sink + s * padded(1)
                 error = float(work[row]) - experience.returns[rows[s]]
                 loss[1] += error * error
                 work[row] = objective.vf_coef * 2.0 * error * objective.share
             backward(critic, tiled, samples, work, behind, gradient)
-        # Every part has its share of what does not depend on samples: the entropy.
+        # Every part has its share of the entropy.
         for j in range(n_actions):
             share = objective.ent_coef * (end - begin) / len(chosen)
             gradient[by_log_std + j] -= share
@@ -228,20 +228,20 @@ def descend(
     descent: Descent,
     steps: int,
 ) -> None:
-    """Add up a gradient, shorten it, take a step of Adam, and transpose the matrices anew.
+    """Add up a gradient, clip it, take a step of Adam, and transpose matrices.
 
     Parameters
     ----------
     actor, critic : Network
-        Networks, whose parameters lie in one array, which is changed.
+        Networks whose parameters lie in one array; changed.
     first_moment, second_moment : ndarray of float32, shape (n_weights,)
-        Running means of the gradients and of their squares; changed.
+        Running means of gradients and their squares; changed.
     gradients : ndarray of float32, shape (n_parts, n_weights)
         Parts of the gradient; the first is overwritten.
     steps : int
         Which step it is, counted from 1.
     """
-    # The whole gradient, and its length in a fixed order of sums.
+    # The gradient, and its length in a fixed order of sums.
     n_parts, n_weights = gradients.shape
     whole, weights = gradients[0], actor.weights
     for part in range(1, n_parts):
@@ -254,7 +254,7 @@ def descend(
     total = 0.0
     for lane in range(LANES):
         total += squares[lane]
-    # Clip its length, and move against the mean gradient over its root mean square.
+    # Clip it, and move against its mean over its root mean square.
     shrink = np.float32(min(descent.max_norm / (math.sqrt(total) + 1e-6), 1.0))
     kept, squares_kept = np.float32(descent.first_decay), np.float32(descent.second_decay)
     taken, squares_taken = (
@@ -278,7 +278,7 @@ def descend(
 
 @inlined
 def whole_power(base: float, exponent: int) -> float:
-    """Power of a number, by squaring."""
+    """Power by squaring."""
     power = 1.0
     while exponent > 0:
         if exponent % 2 == 1:

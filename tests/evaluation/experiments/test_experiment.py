@@ -123,7 +123,10 @@ TOY = {"learner": "ars", "recipe": "tuned"}
         ({"random": {"count": 1, "noise": {"low": 1, "high": 1}}}, "low below high"),
         ({"random": {"count": 1, "noise": 3}}, "random.noise must be a list of values"),
         ({"random": {"count": 1, "noise": {"low": 0, "high": 2, "log": True}}}, "low is above 0"),
-        ({"trials": {"cuont": 5}}, "unknown key 'trials.cuont' (did you mean 'count'?); available: count"),
+        (
+            {"trials": {"cuont": 5}},
+            "unknown key 'trials.cuont' (did you mean 'count'?); available: count",
+        ),
         ({"sedes": 5}, "unknown key 'sedes' (did you mean 'seeds'?); available: name, learners"),
         ({"grid": 5}, "grid must be a table, got 5"),
     ],
@@ -250,7 +253,10 @@ class TestProblem:
     @pytest.mark.parametrize(
         ("path", "words"),
         [
-            ("task.spread", "unknown key 'task.spread' (did you mean 'start_spread'?); available: "),
+            (
+                "task.spread",
+                "unknown key 'task.spread' (did you mean 'start_spread'?); available: ",
+            ),
             ("tusk.spread", "unknown key 'tusk' (did you mean 'task'?); available: "),
             ("task.horizon.x", "'horizon' of 'task.horizon.x' is no table"),
         ],
