@@ -4,7 +4,7 @@ Affine maps, clips and functions are joined into layers with a function each.
 """
 
 from collections.abc import Iterable, Iterator, Mapping
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -12,9 +12,11 @@ from numpy.typing import ArrayLike, NDArray
 from kinarm.errors import InvalidInputError, MissingExtraError
 from kinarm.networks import Activation, Layer
 from kinarm.observation import observation_size
-from kinarm.policies.policy import Policy
 from kinarm.policies.provenance import Provenance, package_versions
 from kinarm.problem import ReachProblem
+
+if TYPE_CHECKING:
+    from kinarm.policies.policy import Policy
 
 CONVERTED = (
     "Sequential, Linear, Tanh, ReLU, ELU (alpha 1), LeakyReLU (slope 0.01), SiLU, Hardtanh, "
@@ -76,13 +78,13 @@ def chained(
 
 
 def policy_of_pieces(
-    kind: type[Policy],
+    kind: "type[Policy]",
     pieces: Iterable[Piece],
     problem: ReachProblem,
     mean: ArrayLike | None = None,
     std: ArrayLike | None = None,
     **origin: Any,
-) -> Policy:
+) -> "Policy":
     """Make a policy of pieces from the observation to the action.
 
     Parameters

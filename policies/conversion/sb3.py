@@ -6,7 +6,7 @@ A model sees the observation, whole or in parts. The statistics that normalise i
 import warnings
 from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from gymnasium.spaces import Box, Dict
@@ -30,9 +30,11 @@ from kinarm.policies.conversion.statistics import (
     find_vec_normalize,
     load_vec_normalize,
 )
-from kinarm.policies.policy import Policy
 from kinarm.problem import ProblemLike, ReachProblem
 from kinarm.simulator import Simulator
+
+if TYPE_CHECKING:
+    from kinarm.policies.policy import Policy
 
 COMPARED, ALIKE = 64, 1e-3
 """Observations for comparing a conversion with its model, and how closely."""
@@ -66,8 +68,8 @@ class SB3Model(NamedTuple):
 
 
 def policy_from_sb3(
-    kind: type[Policy], given: Any, problem: ProblemLike | None, vec_normalize: Any
-) -> Policy:
+    kind: "type[Policy]", given: Any, problem: ProblemLike | None, vec_normalize: Any
+) -> "Policy":
     """Convert a model; see `Policy.from_sb3`.
 
     Parameters
@@ -157,7 +159,7 @@ def _actor_pieces(policy: Any) -> Iterator[Piece]:
 
 
 def _check_same_actions(
-    policy: Policy, original: Any, statistics: Any, interface: Interface, simulator: Simulator
+    policy: "Policy", original: Any, statistics: Any, interface: Interface, simulator: Simulator
 ) -> None:
     """Refuse a conversion that acts otherwise than its model."""
     starts, goals = simulator.sample(np.random.default_rng(0), COMPARED)
