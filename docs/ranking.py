@@ -22,7 +22,7 @@ import numpy as np
 from kinarm._files import write_text
 from kinarm.episodes import Rollouts
 from kinarm.evaluation.bounds import MOST_BOUNDED, oracle_bounds
-from kinarm.evaluation.contestants import find_contestants
+from kinarm.evaluation.finding import find_contestants
 from kinarm.evaluation.metrics import METRICS
 from kinarm.evaluation.outcomes import Outcomes
 from kinarm.evaluation.statistics import share_over_seeds

@@ -1,6 +1,5 @@
 from .bounds import oracle_bounds as oracle_bounds
 from .contestants import Contestant as Contestant
-from .contestants import find_contestants as find_contestants
 from .document import EvaluationDocument as EvaluationDocument
 from .evaluation import Evaluation as Evaluation
 from .evaluation import PooledEvaluation as PooledEvaluation
@@ -11,6 +10,7 @@ from .experiments.experiment import Experiment as Experiment
 from .experiments.study import Study as Study
 from .figures import distance_histograms as distance_histograms
 from .figures import save_figure as save_figure
+from .finding import find_contestants as find_contestants
 from .metrics import METRICS as METRICS
 from .metrics import Metric as Metric
 from .outcomes import Outcomes as Outcomes

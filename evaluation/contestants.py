@@ -1,31 +1,27 @@
 """Contestants of an evaluation: trained policies and baselines."""
 
 import inspect
-import re
 import sys
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
-from importlib import import_module
 from pathlib import Path
 from typing import Any, Protocol
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
 
-from kinarm._files import first_line
 from kinarm.arm import Arm
 from kinarm.episodes import Rollouts
-from kinarm.errors import InvalidInputError, PolicyFileError, UnknownNameError
+from kinarm.errors import InvalidInputError, PolicyFileError
 from kinarm.evaluation.bounds import oracle_bounds
 from kinarm.evaluation.outcomes import Holding
+from kinarm.evaluation.predictors import Actor, Wrapper, run_remembering, run_wrapped
 from kinarm.evaluation.trials import TrialSet, trial_generator
 from kinarm.networks import Networks
 from kinarm.observation import observation_size
-from kinarm.policies.library import models_in, policy_files
 from kinarm.policies.policy import Policy
-from kinarm.policies.provenance import normalization_note
-from kinarm.problem import ProblemLike, ReachProblem
+from kinarm.policies.provenance import normalization_remark
+from kinarm.problem import ReachProblem
 from kinarm.simulator import PolicyFunction
 
 NEVER = sys.float_info.min
@@ -60,6 +56,10 @@ class Contestant:
         The trained policy, if it is one, and its file.
     best_for : tuple of ReachProblem
         What it was chosen for as the best shipped policy.
+    actor : Actor, optional
+        What chooses its actions in Python, to run in a wrapper.
+    remarks : tuple of str
+        What its figures assume: a wrapper, statistics of observations.
     """
 
     name: str
@@ -70,11 +70,15 @@ class Contestant:
     policy: Policy | None = None
     source: Path | None = None
     best_for: tuple[ReachProblem, ...] = ()
+    actor: Actor | None = None
+    remarks: tuple[str, ...] = ()
 
     @property
     def note(self) -> str:
         """A remark in one line, such as the statistics in use; empty if there is none."""
-        return normalization_note(self.name, self.policy.provenance.config) if self.policy else ""
+        config = self.policy.provenance.config if self.policy else {}
+        remarks = [*filter(None, [normalization_remark(config)]), *self.remarks]
+        return f"{self.name}: {'; '.join(remarks)}" if remarks else ""
 
     @property
     def problem(self) -> ReachProblem | None:
@@ -104,6 +108,8 @@ class Contestant:
             return
         if not allow_other_arm:
             self.policy.check_arm(arm)
+        if self.wrapped:
+            return
         widths = (self.policy.n_observations, self.policy.n_actions)
         expected = (observation_size(arm.n_joints), arm.n_actuated)
         if widths != expected:
@@ -131,13 +137,47 @@ class Contestant:
         """
         made = policy.provenance
         return cls(
-            name, partial(_run, policy), made.algorithm, made.recipe, made.seed, policy, source
+            name,
+            partial(_run, policy),
+            made.algorithm,
+            made.recipe,
+            made.seed,
+            policy,
+            source,
+            actor=Actor(policy),
         )
 
     @classmethod
-    def from_function(cls, name: str, function: PolicyFunction) -> "Contestant":
+    def from_function(cls, name: str, function: "PolicyFunction | Predictor") -> "Contestant":
         """Enter a function from observations (n, n_observations) to actions (n, n_actions)."""
-        return cls(name, partial(_run, function), algorithm="function", recipe="")
+        if inspect.isclass(function) or not (callable(function) or hasattr(function, "predict")):
+            raise InvalidInputError(
+                f"{name!r} is neither a function of observations nor has a method predict: "
+                f"it is {function!r}"
+            )
+        return cls.from_actor(name, Actor.of(function), algorithm="function")
+
+    @classmethod
+    def from_actor(cls, name: str, actor: Actor, **about: Any) -> "Contestant":
+        """Enter what chooses actions in Python; ``about`` are further attributes."""
+        if actor.remembers:
+            run = partial(run_remembering, actor)
+        else:
+            plain = actor.statistics is None and not hasattr(actor.policy, "predict")
+            run = partial(_run, actor.policy if plain else actor.actions)
+        return cls(name, run, **{"recipe": "", "actor": actor, **about})
+
+    @property
+    def wrapped(self) -> bool:
+        """Whether it runs in a wrapper."""
+        return isinstance(self.run, partial) and self.run.func is run_wrapped
+
+    def in_wrapper(self, wrapper: Wrapper, name: str) -> "Contestant":
+        """The same policy in a wrapper, with its name; baselines need none."""
+        if self.actor is None:
+            return self
+        remarks = (*self.remarks, f"in wrapper {name}")
+        return replace(self, run=partial(run_wrapped, self.actor, wrapper), remarks=remarks)
 
 
 def _run(actor: Policy | PolicyFunction, trials: TrialSet, *, record: bool = False) -> Rollouts:
@@ -186,122 +226,3 @@ def measure_holding(contestant: Contestant, trials: TrialSet) -> Holding:
     else:
         rollouts = contestant.run(endless, record=True)
     return Holding.of(rollouts, trials)
-
-
-def find_contestants(
-    name_or_file: str | Path,
-    problem: ProblemLike | None = None,
-    vec_normalize: str | Path | None = None,
-) -> tuple[Contestant, ...]:
-    """Find what a name stands for.
-
-    Parameters
-    ----------
-    name_or_file : str or Path
-        A baseline, ``"oracle"``, a shipped policy, a group of them (all
-        training seeds), ``"best"``, a policy file, a model of Stable-Baselines3
-        (.zip), a folder of either, or ``"module:function"``. A model and a
-        module run code: open only those that you trust.
-    problem : ReachProblem, str or Path, optional
-        What a model is for, as its file does not say, or the best shipped
-        policy; others say it themselves.
-    vec_normalize : str or Path, optional
-        Statistics of a model's observations; see `Policy.from_sb3`.
-    """
-    text = str(name_or_file)
-    if text in UNTRAINED:
-        return (UNTRAINED[text],)
-    models = [Path(text)] if text.endswith(".zip") else models_in(Path(text))
-    if models:
-        return tuple(_model_contestant(path, problem, vec_normalize) for path in models)
-    if is_import_path(text):
-        return (_imported_contestant(text),)
-    try:
-        paths = policy_files(name_or_file, problem)
-    except UnknownNameError as error:
-        available = (*UNTRAINED, *error.available, "path/to/model.zip", "module:function")
-        raise UnknownNameError(error.kind, error.given, available) from None
-    return tuple(
-        Contestant.from_policy(path.stem, Policy.load(path), path.resolve()) for path in paths
-    )
-
-
-def contestant_of(
-    policy: str | Path | Policy | Contestant | PolicyFunction | Predictor,
-    problem: ProblemLike | None,
-) -> Contestant:
-    """Enter a policy, the first of a name or file, or a function."""
-    if isinstance(policy, Contestant):
-        return policy
-    if isinstance(policy, Policy):
-        made = policy.provenance
-        return Contestant.from_policy(
-            f"{made.algorithm}-{made.recipe}-{policy.problem.name}", policy
-        )
-    if isinstance(policy, str | Path):
-        return find_contestants(policy, problem)[0]
-    name = getattr(policy, "__name__", None) or type(policy).__name__
-    return Contestant.from_function(name, policy_function(policy, name))
-
-
-def _model_contestant(
-    path: Path, problem: ProblemLike | None, vec_normalize: str | Path | None
-) -> Contestant:
-    """A model of Stable-Baselines3."""
-    try:
-        policy = Policy.from_sb3(path, problem, vec_normalize)
-    except InvalidInputError as error:
-        raise InvalidInputError(f"{str(path)!r}: {error}") from error
-    return Contestant.from_policy(path.stem, policy, path.resolve())
-
-
-def is_import_path(text: str) -> bool:
-    """Whether a text has the form ``module:function``."""
-    return re.fullmatch(r"[A-Za-z_][\w.]*:[A-Za-z_]\w*", text) is not None
-
-
-def _imported_contestant(name: str) -> Contestant:
-    """A policy or function of a module, perhaps in the current directory."""
-    module_name, _, attribute = name.partition(":")
-    if str(Path.cwd()) not in sys.path:
-        sys.path.insert(0, str(Path.cwd()))
-    import_module("kinarm.envs")  # the module may make one by its id
-    try:
-        module = import_module(module_name)
-    except Exception as error:  # a module can raise anything
-        raise InvalidInputError(
-            f"cannot import {module_name!r} of policy {name!r}: {first_line(error)}"
-        ) from error
-    if not hasattr(module, attribute):
-        offered = (
-            key
-            for key, each in vars(module).items()
-            if key[0] != "_" and (hasattr(each, "predict") or inspect.isfunction(each))
-        )
-        raise UnknownNameError(f"name in module {module_name}:", attribute, offered)
-    found = getattr(module, attribute)
-    if isinstance(found, Policy):
-        return Contestant.from_policy(name, found)
-    return Contestant.from_function(name, policy_function(found, name))
-
-
-def policy_function(policy: Any, name: str) -> PolicyFunction:
-    """The function of observations, (n, n_observations), itself or as ``predict``."""
-    if inspect.isclass(policy) or not (callable(policy) or hasattr(policy, "predict")):
-        raise InvalidInputError(
-            f"{name!r} is neither a function of observations nor has a method predict: "
-            f"it is {policy!r}"
-        )
-    predict = getattr(policy, "predict", None)
-    if predict is None:
-        function: PolicyFunction = policy
-        return function
-    known = inspect.signature(predict).parameters
-    options = {"deterministic": True} if "deterministic" in known else {}
-
-    def actions(observations: NDArray[np.float64]) -> ArrayLike:
-        answer = predict(observations, **options)
-        chosen: ArrayLike = answer[0] if isinstance(answer, tuple) else answer
-        return chosen
-
-    return actions

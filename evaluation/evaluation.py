@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from kinarm.episodes import Outcome, Rollouts
 from kinarm.errors import InvalidInputError
 from kinarm.evaluation.bounds import MOST_BOUNDED, oracle_bounds
-from kinarm.evaluation.contestants import Contestant, Predictor, contestant_of, measure_holding
+from kinarm.evaluation.contestants import Contestant, Predictor, measure_holding
 from kinarm.evaluation.document import (
     EvaluationDocument,
     FacedProblem,
@@ -28,7 +28,9 @@ from kinarm.evaluation.document import (
     TrialHolding,
     WorstSeed,
 )
+from kinarm.evaluation.finding import contestant_of
 from kinarm.evaluation.outcomes import Holding, Outcomes, failure_causes
+from kinarm.evaluation.predictors import Wrapper
 from kinarm.evaluation.selection import check_names, group_names
 from kinarm.evaluation.statistics import Estimate, estimate_metrics
 from kinarm.evaluation.trials import TrialSet
@@ -236,6 +238,7 @@ def evaluate(
     allow_other_arm: bool = False,
     oracle: bool = False,
     hold: bool = False,
+    wrapper: Wrapper | None = None,
     **overrides: Any,
 ) -> Evaluation:
     """Evaluate one policy on the trials (paper, section 3.3: 200 random goals, 64 steps each).
@@ -258,6 +261,9 @@ def evaluate(
     hold : bool
         Whether to run the trials once more without an end at success; see
         `Evaluation`.
+    wrapper : callable, optional
+        Function from an environment to a wrapped one, in which the policy faces
+        the trials; see `find_contestants`.
     **overrides
         Changes of the problem, such as ``tolerance``; see
         `kinarm.ReachProblem.replace`.
@@ -271,7 +277,7 @@ def evaluate(
         If the policy cannot be read, was trained for another arm, or does not
         fit this one.
     """
-    contestant = contestant_of(policy, problem)
+    contestant = contestant_of(policy, problem, wrapper)
     faced = problem if problem is not None else contestant.problem
     if faced is None:
         raise InvalidInputError(f"{contestant.name!r} was not trained for a problem: name one")

@@ -58,6 +58,9 @@ class EvaluationRequest(ProblemOptions):
     vec_normalize : Path
         Statistics of VecNormalize for models of Stable-Baselines3 (runs code),
         or none; by default those that bear a model's name.
+    wrapper : str
+        module:function from an environment to a wrapped one, in which policies
+        face the trials.
     allow_other_arm : bool
         Allow an arm that a policy was not trained for.
     matrix : bool
@@ -99,6 +102,7 @@ class EvaluationRequest(ProblemOptions):
     trials: int = field(default=200, metadata=TRIALS)
     seed: int = field(default=0, metadata=FROM_ZERO)
     vec_normalize: Path | None = field(default=None, metadata={"metavar": "FILE|none"})
+    wrapper: str | None = field(default=None, metadata={"metavar": "MODULE:FUNCTION"})
     allow_other_arm: bool = False
     matrix: bool = False
     oracle: bool = True
@@ -111,7 +115,14 @@ class EvaluationRequest(ProblemOptions):
     markdown: bool = False
 
     GROUPS: ClassVar = {
-        "what is evaluated": ("policies", "problems", "vec_normalize", "matrix", "allow_other_arm"),
+        "what is evaluated": (
+            "policies",
+            "problems",
+            "vec_normalize",
+            "wrapper",
+            "matrix",
+            "allow_other_arm",
+        ),
         "trials": ("trials", "seed", "oracle", "hold"),
         "output": ("out", "report", "card", "overwrite", "json", "markdown"),
         "changes to the problems": ProblemOptions.GROUPS["problem"][1:],

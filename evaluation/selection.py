@@ -10,7 +10,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from kinarm.errors import InvalidInputError
-from kinarm.evaluation.contestants import BASELINES, ORACLE, Contestant, find_contestants
+from kinarm.evaluation.contestants import BASELINES, ORACLE, Contestant
+from kinarm.evaluation.finding import find_contestants
 from kinarm.policies.library import BEST, group_of, is_shipped, policy_names
 from kinarm.problem import PROBLEMS, ReachProblem
 
@@ -85,11 +86,11 @@ def _named_contestants(request: "EvaluationRequest", named: list[ReachProblem]) 
     found: dict[tuple[str, Path | None], Contestant] = {}
     for name in request.policies:
         if name != BEST:
-            chosen = find_contestants(name, only, request.vec_normalize)
+            chosen = find_contestants(name, only, request.vec_normalize, request.wrapper)
             found |= {(each.name, each.source): each for each in chosen}
             continue
         for problem in named or [_changed(request, each) for each in PROBLEMS.values()]:
-            (best,) = find_contestants(BEST, problem)
+            (best,) = find_contestants(BEST, problem, wrapper=request.wrapper)
             before = found.get((best.name, best.source), best)
             best_for = (*before.best_for, problem)
             found[best.name, best.source] = replace(before, best_for=best_for)

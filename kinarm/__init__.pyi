@@ -23,7 +23,7 @@ from .errors import StartInContactError as StartInContactError
 from .errors import TrainingFailedError as TrainingFailedError
 from .errors import UnknownNameError as UnknownNameError
 from .errors import WorkerError as WorkerError
-from .kinematics import InverseSolutions as InverseSolutions
+from .inverse_kinematics import InverseSolutions as InverseSolutions
 from .networks import CompiledPolicy as CompiledPolicy
 from .networks import Mirror as Mirror
 from .networks import Networks as Networks

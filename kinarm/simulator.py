@@ -1,5 +1,6 @@
 """The simulator: a problem, stepped in batches of episodes."""
 
+import inspect
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from copy import copy
@@ -23,7 +24,7 @@ from kinarm.scene import Scene
 from kinarm.task import ReachTask
 from kinarm.world import World
 
-PolicyFunction = Callable[[Array], ArrayLike]
+PolicyFunction = Callable[..., ArrayLike]
 """Observations, shape (n, n_observations), to actions, shape (n, n_actuated)."""
 
 
@@ -166,7 +167,8 @@ class Simulator:
         policies : Networks, policy, sequence of policies, or function
             One policy for all episodes, or one for each. Those with
             ``networks()`` run compiled; a function from observations (n,
-            n_observations) to actions (n, n_actions) is called once a step.
+            n_observations) to actions (n, n_actions) is called once a step for
+            the running episodes; if it takes ``rows``, it gets their numbers.
         starts, goals, record
             As for `reset`.
         policy_index : array_like of int, shape (n,), optional
@@ -317,9 +319,12 @@ class Simulator:
 
     def _follow(self, policy: PolicyFunction, episodes: Episodes) -> None:
         """Drive episodes to their end with a Python function."""
+        wants_rows = False
+        with suppress(TypeError, ValueError):  # of functions without a signature
+            wants_rows = "rows" in inspect.signature(policy).parameters
         actions = np.zeros((len(episodes.status), self.n_actions))
-        while (running := episodes.status == RUNNING).any():
-            actions[running] = finite_array(
-                "actions", policy(episodes.observation[running]), (running.sum(), self.n_actions)
-            )
+        while (rows := np.flatnonzero(episodes.status == RUNNING)).size:
+            seen = episodes.observation[rows]
+            chosen = policy(seen, rows) if wants_rows else policy(seen)
+            actions[rows] = finite_array("actions", chosen, (len(rows), self.n_actions))
             self._step(episodes, actions)

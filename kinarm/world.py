@@ -14,19 +14,19 @@ from kinarm.collision import Contact, ContactModel
 from kinarm.contact_shapes import PLANE, ContactShapes
 from kinarm.episodes import Control, Episodes, Rules
 from kinarm.errors import ProblemError, finite_array, one_or_many, whole_number
+from kinarm.inverse_kinematics import InverseKinematics
 from kinarm.kernels.closest import Bodies
 from kinarm.kernels.compiling import Array
 from kinarm.kernels.records import recorded
 from kinarm.kernels.rollout import begin
 from kinarm.kernels.screening import screen
 from kinarm.kernels.session import Alone, Block, Session, work_space
-from kinarm.kinematics import Kinematics
 from kinarm.observation import observation_size
 from kinarm.problem import ProblemLike, ReachProblem
 from kinarm.task import REWARD_TERMS, Goals
 
 
-class World(Kinematics):
+class World(InverseKinematics):
     """An arm in a scene.
 
     Parameters

@@ -92,20 +92,14 @@ def plain_settings(config: TrainingConfig) -> dict[str, Any]:
     return {name: value for name, value in to_plain(config).items() if name != "problem"}
 
 
-def normalization_note(name: str, config: Mapping[str, Any]) -> str:
-    """Which statistics normalise what a converted model sees, in a line; empty for other policies.
-
-    Parameters
-    ----------
-    name, config : str, mapping
-        Its name in tables, and the settings of its training.
-    """
+def normalization_remark(config: Mapping[str, Any]) -> str:
+    """Which statistics normalise what a converted model sees; empty for other policies."""
     statistics = config.get("vec_normalize")
     if statistics is None:
         return ""
     if statistics == "none":
-        return f"{name}: observations not normalised, without VecNormalize"
-    return f"{name}: observations normalised by {statistics}"
+        return "observations not normalised, without VecNormalize"
+    return f"observations normalised by {statistics}"
 
 
 @cache

@@ -9,14 +9,9 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from kinarm.errors import InvalidInputError, UnknownNameError
 from kinarm.evaluation.bounds import oracle_bounds
-from kinarm.evaluation.contestants import (
-    ORACLE,
-    UNTRAINED,
-    Contestant,
-    find_contestants,
-    is_import_path,
-)
+from kinarm.evaluation.contestants import ORACLE, UNTRAINED, Contestant
 from kinarm.evaluation.document import EvaluationDocument, Result
+from kinarm.evaluation.finding import find_contestants, is_import_path
 from kinarm.evaluation.outcomes import failure_causes
 from kinarm.evaluation.replay.runs import record
 from kinarm.evaluation.trials import TrialSet
@@ -165,7 +160,7 @@ def named_contestants(
     """
     named = request.problem is not None or request.task is not None
     stated = request.resolve() if named or BEST in names else None
-    contestants = [_first_contestant(name, stated, request.vec_normalize) for name in names]
+    contestants = [_first_contestant(name, stated, request) for name in names]
     if stated is not None:
         return contestants, stated
     trained = [contestant.problem for contestant in contestants if contestant.problem is not None]
@@ -175,12 +170,15 @@ def named_contestants(
 
 
 def _first_contestant(
-    name: str | None, problem: ReachProblem | None = None, vec_normalize: Path | None = None
+    name: str | None,
+    problem: ReachProblem | None = None,
+    request: "ReplayRequest | None" = None,
 ) -> Contestant:
-    """The contestant of a name, of a group its first seed; for a problem, if it does not say."""
+    """The contestant of a name, of a group the first seed."""
     if name is None:
         raise InvalidInputError("name a --policy, or a file of recordings or of an evaluation")
-    return find_contestants(name, problem, vec_normalize)[0]
+    how = (request.vec_normalize, request.wrapper) if request else ()
+    return find_contestants(name, problem, *how)[0]
 
 
 def _evaluated_candidates(
@@ -193,7 +191,7 @@ def _evaluated_candidates(
         contestant = None
         if name is not None and (Path(name).suffix in (".npz", ".zip") or is_import_path(name)):
             faced = problem or next(iter(document.protocol.problems))
-            contestant = _first_contestant(name, document.problem(faced), request.vec_normalize)
+            contestant = _first_contestant(name, document.problem(faced), request)
         row = document.result(_name_in(document, contestant) if contestant else name, problem)
         problem = row.problem
         chosen.append((row, contestant or _known_contestant(row.policy, path)))

@@ -48,6 +48,9 @@ class ReplayRequest(ProblemOptions):
     vec_normalize : Path
         Statistics of VecNormalize for a model of Stable-Baselines3 (runs code),
         or none; by default those that bear its name.
+    wrapper : str
+        module:function from an environment to a wrapped one, in which policies
+        face the trials.
     compare : tuple of str
         Two policies on the same trials, the second as a ghost.
     trial : tuple of int
@@ -92,6 +95,7 @@ class ReplayRequest(ProblemOptions):
         default=None, metadata={"metavar": "NAME_OR_FILE", "completes": policy_choices}
     )
     vec_normalize: Path | None = field(default=None, metadata={"metavar": "FILE|none"})
+    wrapper: str | None = field(default=None, metadata={"metavar": "MODULE:FUNCTION"})
     compare: tuple[str, str] | None = field(default=None, metadata={"metavar": ("A", "B")})
     trial: tuple[int, ...] = field(default=(), metadata={"repeat": True, **FROM_ZERO})
     worst: int | None = None
@@ -109,7 +113,14 @@ class ReplayRequest(ProblemOptions):
     browser: bool = True
 
     GROUPS: ClassVar = {
-        "what is replayed": ("source", "policy", "vec_normalize", "compare", "allow_other_arm"),
+        "what is replayed": (
+            "source",
+            "policy",
+            "vec_normalize",
+            "wrapper",
+            "compare",
+            "allow_other_arm",
+        ),
         "which trials": (
             *("trials", "seed", "trial", "worst", "collisions", "failures", "oracle"),
         ),
@@ -184,7 +195,7 @@ class ReplayRequest(ProblemOptions):
 
     def _write(self, report: Callable[[str], object]) -> "ReplayPage":
         from kinarm.evaluation.replay.choosing import chosen_recordings
-        from kinarm.policies.provenance import normalization_note
+        from kinarm.policies.provenance import normalization_remark
         from kinarm.recording import save_recordings
         from kinarm.viewer import replay_page
 
@@ -203,8 +214,8 @@ class ReplayRequest(ProblemOptions):
         page.save(out)
         for recording in (run[0] for run in runs):
             policy = recording.provenance.get("policy") or {}
-            if note := normalization_note(recording.policy, policy.get("config", {})):
-                report(note)
+            if remark := normalization_remark(policy.get("config", {})):
+                report(f"{recording.policy}: {remark}")
         if groups:
             report(heading)
             for group, count in Counter(groups).items():

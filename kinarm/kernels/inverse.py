@@ -17,7 +17,7 @@ from kinarm.kernels.kinematics import POSE, forward_kinematics, point_jacobian, 
 from kinarm.kernels.lanes import LANES, any_lane, as_lanes, as_numbers, lane_bits, select
 
 PRECISION = 1e-10
-"""Error at arrival: share of the arm's reach, and angle [rad]."""
+"""Error at which a seed stops: share of the arm's reach, and angle [rad]."""
 
 ITERATIONS = 48
 """Steps of a seed at most."""
@@ -49,6 +49,8 @@ class Search(NamedTuple):
         one or three.
     scale : float
         Inverse of the arm's reach [1/m].
+    position_tolerance, rotation_tolerance : float
+        Errors with which seeds arrive that come no closer [m, rad].
     near : ndarray, shape (n_joints,)
         First seed, where other joints rest and to which whole turns are
         closest.
@@ -63,6 +65,8 @@ class Search(NamedTuple):
     tool: Array
     axes: Array
     scale: float
+    position_tolerance: float
+    rotation_tolerance: float
     near: Array
     seeds: Array
     least: int
@@ -224,6 +228,7 @@ def solve_targets(
         turns = not prismatic[k] and (search.least > 0 or upper[k] - lower[k] >= TURN)
         lowest[k], highest[k] = (-math.inf, math.inf) if turns else (lower[k], upper[k])
     hits = np.zeros(most + 1, dtype=np.int64)
+    farthest, widest = search.scale * search.position_tolerance, search.rotation_tolerance
     for target in range(first, last):
         for k in range(3):
             aim[k] = positions[target, k]
@@ -248,16 +253,19 @@ def solve_targets(
             point = to_world(poses, n_joints, tool[0], tool[1], tool[2])
             point_jacobian(chain, poses, point, jacobian)
             squared = 0.0 * point[0]
+            turned = 0.0 * point[0]
             for i in range(3):
                 error[i] = search.scale * (aim[i] - point[i])
                 squared += error[i] * error[i]
                 for k in range(n):
                     jacobian[i, k] = search.scale * jacobian[i, k]
+            moved = squared
             if n_axes > 0:
                 turn = orientation_error(search.axes, poses, wanted, jacobian)
                 for i in range(3):
                     error[3 + i] = turn[i]
                     squared += turn[i] * turn[i]
+                    turned += turn[i] * turn[i]
             # A damped Newton step, without joints that it would push beyond a limit.
             arrived = squared <= PRECISION * PRECISION
             damping = DAMPING * squared + LEAST_DAMPING
@@ -269,7 +277,9 @@ def solve_targets(
             stuck = (iteration[0] >= PATIENCE) & (squared > PROGRESS * before[0])
             ended = arrived | stuck | (iteration[0] >= ITERATIONS)
             before[0] = squared
-            ended_bits, arrived_bits = lane_bits(ended) & ~free, lane_bits(arrived) & ~free
+            close = (moved <= farthest * farthest) & (turned <= widest * widest)
+            ended_bits = lane_bits(ended) & ~free
+            arrived_bits = lane_bits(arrived | ended & close) & ~free
             for lane in range(LANES if ended_bits != 0 else 0):
                 if ended_bits >> lane & 1:
                     tried, n_moving = tried + 1, n_moving - 1

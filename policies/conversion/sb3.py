@@ -3,18 +3,16 @@
 A model sees the observation, whole or in parts. The statistics that normalise it lie apart.
 """
 
-import warnings
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from gymnasium.spaces import Box, Dict
 
-from kinarm._files import reading
 from kinarm.envs.environment import Interface
 from kinarm.envs.goal import GoalInterface
-from kinarm.errors import InvalidInputError, MissingExtraError, PolicyFileError
+from kinarm.errors import InvalidInputError
 from kinarm.networks import Layer
 from kinarm.observation import OBSERVATION, part_slices
 from kinarm.policies.conversion.layers import (
@@ -24,6 +22,7 @@ from kinarm.policies.conversion.layers import (
     normalization,
     policy_of_pieces,
 )
+from kinarm.policies.conversion.models import SB3Model, saved_model, sb3_model
 from kinarm.policies.conversion.statistics import (
     NONE,
     check_not_normalized,
@@ -39,32 +38,13 @@ if TYPE_CHECKING:
 COMPARED, ALIKE = 64, 1e-3
 """Observations for comparing a conversion with its model, and how closely."""
 
-FAMILIES = ("TQCPolicy", "SACPolicy", "TD3Policy", "ActorCriticPolicy")
-"""Classes of policies that can be converted."""
+NO_PROBLEM = "the model does not say which problem it is for: give it (problem=, --problem)"
 
 NOT_SETTINGS = ("verbose", "seed", "num_timesteps", "start_time", "tensorboard_log", "device")
 """Attributes of a model that do not tell how it was trained."""
 
 ROUNDING = 1e-5
 """How closely the bounds of float32 spaces must agree."""
-
-
-class SB3Model(NamedTuple):
-    """What a conversion needs of a model; ``env`` is None if it is unknown."""
-
-    policy: Any
-    algorithm: str
-    attributes: Mapping[str, Any]
-    env: Any
-
-    @property
-    def problem(self) -> ReachProblem | None:
-        """The problem of its environment, if known."""
-        try:
-            problem = self.env.get_attr("simulator", 0)[0].problem
-        except (AttributeError, EOFError, OSError):  # not an environment of kinarm
-            return None
-        return problem if isinstance(problem, ReachProblem) else None
 
 
 def policy_from_sb3(
@@ -90,9 +70,7 @@ def policy_from_sb3(
     model = sb3_model(given)
     own = ReachProblem.load(problem) if problem is not None else model.problem
     if own is None:
-        raise InvalidInputError(
-            "the model does not say which problem it is for: give it (problem=, --problem)"
-        )
+        raise InvalidInputError(NO_PROBLEM)
     simulator = Simulator(own, threads=1)
     interface, selection, sizes = model_inputs(model.policy, simulator)
     statistics, origin = _statistics_of(model, given, vec_normalize, simulator.arm.n_joints)
@@ -121,7 +99,7 @@ def policy_from_sb3(
 
 
 def _statistics_of(
-    model: SB3Model, given: Any, asked: Any, n_joints: int
+    model: SB3Model, given: Any, asked: Any, n_joints: int | None
 ) -> tuple[Any, str | None]:
     """The ``VecNormalize`` of a model's observations, or None, and where it is from to tell."""
     from stable_baselines3.common.vec_env import unwrap_vec_normalize
@@ -139,7 +117,8 @@ def _statistics_of(
         return statistics, "VecNormalize of its environment"
     if file is None:
         return None, None
-    check_not_normalized(model.attributes.get("_last_obs"), n_joints, file)
+    if n_joints is not None:
+        check_not_normalized(model.attributes.get("_last_obs"), n_joints, file)
     return None, NONE
 
 
@@ -176,71 +155,33 @@ def _check_same_actions(
         )
 
 
-def sb3_model(given: Any) -> SB3Model:
-    """Take what a conversion needs from a model or its file."""
-    if isinstance(given, str | Path):
-        return _saved_model(Path(given))
-    if not hasattr(given, "policy") or not hasattr(given, "num_timesteps"):
-        raise InvalidInputError(
-            f"expected a model of Stable-Baselines3 or its file, got {type(given).__name__}"
-        )
-    _family(type(given.policy))
-    return SB3Model(given.policy, type(given).__name__.lower(), vars(given), given.get_env())
+def native_model(
+    path: Path, problem: ProblemLike | None, vec_normalize: Any, *, wrapped: bool
+) -> tuple[SB3Model, Any, str | None]:
+    """Load a model to use as it is, since it remembers or sees a wrapper's observations.
 
+    Parameters
+    ----------
+    path, problem, vec_normalize
+        As for `Policy.from_sb3`.
+    wrapped : bool
+        Whether it sees a wrapper's observations, which are not checked.
 
-def _saved_model(path: Path) -> SB3Model:
-    """Build the networks of a file, without the buffers of a training."""
-    try:
-        from stable_baselines3.common.save_util import load_from_zip_file
-    except ImportError as error:
-        raise MissingExtraError("stable-baselines3", "sb3") from error
-    name = repr(str(path))
-    told: Any = {"name": name, "kind": "model", "error": PolicyFileError, "of": "Stable-Baselines3"}
-    try:
-        with reading(**told), warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # about attributes that are not needed here
-            data, parameters, _ = load_from_zip_file(path, device="cpu")
-    except PolicyFileError as error:
-        if str(getattr(error.__cause__, "name", None)).startswith("sb3_contrib"):
-            raise MissingExtraError("sb3-contrib", "zoo") from error
-        raise
-    if not data or not isinstance(data.get("policy_class"), type):
-        raise PolicyFileError(f"{name} holds no policy that Stable-Baselines3 can build here")
-    kind = data["policy_class"]
-    family = _family(kind)
-    with reading(**told):
-        options = {key: each for key, each in data["policy_kwargs"].items() if key != "device"}
-        if family == "ActorCriticPolicy":
-            options = {"use_sde": data["use_sde"], **options}
-        spaces = (data["observation_space"], data["action_space"])
-        policy = kind(*spaces, lambda _: 0.0, **options)
-        policy.load_state_dict(parameters["policy"])
-    return SB3Model(policy, _algorithm_of(family, data), data, None)
-
-
-def _family(kind: type) -> str:
-    """The base class of a policy that can be converted."""
-    names = [base.__name__ for base in kind.__mro__]
-    if any("Recurrent" in name for name in names):
-        raise InvalidInputError(
-            f"the model is recurrent ({kind.__name__}): kinarm's policies see one observation"
-        )
-    for family in FAMILIES:
-        if family in names:
-            return family
-    raise InvalidInputError(
-        f"cannot convert the policy {kind.__name__}; what can be converted: models of TQC, SAC, "
-        "DDPG, TD3, PPO, A2C"
-    )
-
-
-def _algorithm_of(family: str, data: Mapping[str, Any]) -> str:
-    """Which algorithm a file is of, judged by its settings."""
-    if family == "ActorCriticPolicy":
-        return "ppo" if "clip_range" in data else "a2c"
-    if family == "TD3Policy":
-        return "ddpg" if data["policy_delay"] == 1 and not data["target_noise_clip"] else "td3"
-    return "tqc" if family == "TQCPolicy" else "sac"
+    Returns
+    -------
+    tuple
+        The model; the ``VecNormalize`` of its observations or None; and where
+        that is from.
+    """
+    if problem is None:
+        raise InvalidInputError(NO_PROBLEM)
+    model = saved_model(path, any_kind=True)
+    simulator = Simulator(problem, threads=1)
+    if not wrapped:
+        _check_actions(model.policy.action_space, simulator)
+        _check_observations(model.policy.observation_space, Interface(simulator), simulator)
+    n_joints = None if wrapped else simulator.arm.n_joints
+    return model, *_statistics_of(model, path, vec_normalize, n_joints)
 
 
 def model_inputs(policy: Any, simulator: Simulator) -> tuple[Interface, Layer, dict[str, int]]:

@@ -6,8 +6,9 @@ from pathlib import Path
 import pytest
 
 from kinarm.evaluation.bounds import oracle_bounds
-from kinarm.evaluation.contestants import ORACLE, find_contestants
+from kinarm.evaluation.contestants import ORACLE
 from kinarm.evaluation.evaluation import evaluation_document, run_trials
+from kinarm.evaluation.finding import find_contestants
 from kinarm.evaluation.report.groups import group_results, worst_trials
 from kinarm.evaluation.report.page import write_report
 from kinarm.evaluation.table import metric_columns

@@ -22,10 +22,11 @@ import numpy as np
 from kinarm.arm import Arm
 from kinarm.errors import KinarmError
 from kinarm.evaluation import EvaluationDocument, Study, oracle_bounds
-from kinarm.evaluation.contestants import find_contestants
+from kinarm.evaluation.finding import find_contestants
 from kinarm.meshes import hull_of_mesh
 from kinarm.policies import Policy, load_checkpoint, recipe
-from kinarm.policies.conversion.sb3 import load_vec_normalize, sb3_model
+from kinarm.policies.conversion.models import sb3_model
+from kinarm.policies.conversion.statistics import load_vec_normalize
 from kinarm.policies.learners import state_policy
 from kinarm.problem import ReachProblem, find_scene, find_task
 from kinarm.recording import load_recordings

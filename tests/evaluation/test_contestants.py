@@ -7,12 +7,8 @@ import pytest
 
 from kinarm.errors import InvalidInputError, PolicyFileError
 from kinarm.evaluation.bounds import oracle_bounds
-from kinarm.evaluation.contestants import (
-    ORACLE,
-    UNTRAINED,
-    Contestant,
-    find_contestants,
-)
+from kinarm.evaluation.contestants import ORACLE, UNTRAINED, Contestant
+from kinarm.evaluation.finding import find_contestants
 from kinarm.evaluation.selection import check_names
 from kinarm.evaluation.trials import TrialSet
 from kinarm.problem import PROBLEMS

@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from kinarm.evaluation import ReplayRequest
-from kinarm.evaluation.contestants import ORACLE, find_contestants
+from kinarm.evaluation.contestants import ORACLE
+from kinarm.evaluation.finding import find_contestants
 from kinarm.evaluation.replay import runs
 from kinarm.evaluation.replay.runs import follow, fresh_recordings
 from kinarm.evaluation.trials import TrialSet

@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from kinarm.evaluation.contestants import find_contestants
 from kinarm.evaluation.evaluation import run_trials
+from kinarm.evaluation.finding import find_contestants
 from kinarm.evaluation.trials import TrialSet
 from kinarm.policies import load_policy, policy_names, recipe
 from kinarm.policies.mirror import find_mirror

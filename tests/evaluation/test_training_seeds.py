@@ -5,7 +5,8 @@ from pathlib import Path
 
 import pytest
 
-from kinarm.evaluation.contestants import BASELINES, ORACLE, Contestant, find_contestants
+from kinarm.evaluation.contestants import BASELINES, ORACLE, Contestant
+from kinarm.evaluation.finding import find_contestants
 from kinarm.evaluation.selection import group_names, named_apart
 from kinarm.policies import Policy, recipe, train_policy
 from kinarm.problem import PROBLEMS

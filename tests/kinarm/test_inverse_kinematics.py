@@ -4,7 +4,8 @@ import numpy as np
 import pinocchio as pin
 import pytest
 from configurations import random_configurations
-from scipy.optimize import root
+from scipy.optimize import minimize, root
+from scipy.spatial.transform import Rotation
 
 from kinarm.arm import Arm
 from kinarm.errors import InvalidInputError
@@ -320,3 +321,69 @@ def test_refusals_are_one_line(simulator, given, message):
     with pytest.raises(InvalidInputError, match=message) as caught:
         simulator.world.inverse_kinematics(**given)
     assert "\n" not in str(caught.value)
+
+
+@pytest.fixture(scope="module")
+def rounded(make_joint, write_robot):
+    """An arm of five axes, whose right angles are rounded as in many a URDF."""
+    limit = '<limit lower="-3" upper="3" velocity="3" effort="0"/>'
+    places = [
+        ("0 0 0.1", "0 0 0"),
+        ("0 0 0.1", "1.5708 0 0"),
+        ("0.2 0 0", "0 0 0"),
+        ("0.2 0 0", "0 0 0"),
+        ("0.05 0 0", "0 1.5708 0"),
+    ]
+    joints = [make_joint(xyz=xyz, rpy=rpy, limit=limit) for xyz, rpy in places]
+    return world_of(Arm.load(write_robot(joints, tool="0 0 0.1")))
+
+
+DOWN = [0.0, 0.0, -1.0]
+POINTS = [[0.2 * np.cos(angle), 0.2 * np.sin(angle), 0.1] for angle in np.linspace(-2, 2, 16)]
+
+
+class TestFewAxes:
+    """Of five coordinates four joints reach only to the rounding of their axes."""
+
+    def test_directions_are_reached_to_rounding(self, rounded):
+        assert len(rounded.inverse_kinematics(POINTS, DOWN, rotation_tolerance=0.0)) == 0
+        solutions = rounded.inverse_kinematics(POINTS, DOWN)
+        assert set(solutions.owner) == {*range(16)}
+        poses = rounded.poses(solutions.configurations)
+        apart = np.linalg.norm(poses[:, :3, 3] - np.array(POINTS)[solutions.owner], axis=1)
+        turned = np.linalg.norm(np.cross(poses[:, :3, 2], DOWN), axis=1)
+        np.testing.assert_allclose(solutions.position_error, apart, atol=1e-15)
+        np.testing.assert_allclose(solutions.rotation_error, turned, atol=1e-12)
+        assert (apart <= 1e-6).all()
+        assert (turned <= 1e-5).all()
+        assert turned.max() > 1e-7
+
+    def test_the_nearest_pose_is_given_where_there_is_none(self, rounded):
+        pose = np.eye(4)
+        pose[:3, 3] = [0.2, 0.1, 0.3]  # the tool up, at any turn: another than the arm can have
+        assert len(rounded.inverse_kinematics(pose)) == 0
+        nearest = rounded.inverse_kinematics(pose, best=True)
+        assert (nearest.owner == [0]).all()
+        reached = rounded.poses(nearest.configurations[0])
+        turn = Rotation.from_matrix(pose[:3, :3].T @ reached[:3, :3]).magnitude()
+        np.testing.assert_allclose(nearest.rotation_error, turn, atol=1e-7)
+
+        def missed(q):
+            placed = rounded.poses(q)
+            turn = Rotation.from_matrix(pose[:3, :3].T @ placed[:3, :3]).magnitude()
+            off = np.linalg.norm(placed[:3, 3] - pose[:3, 3]) / rounded.arm.reach
+            return np.hypot(off, turn)
+
+        starts = random_configurations(rounded, 3, 40)
+        bounds = list(zip(rounded.arm.lower, rounded.arm.upper, strict=True))
+        others = [minimize(missed, q, method="Nelder-Mead", bounds=bounds).fun for q in starts]
+        assert missed(nearest.configurations[0]) <= min(others) + 1e-3
+
+    def test_out_of_reach(self, elbow):
+        """The arm stretches towards the target."""
+        targets = [[2.0, 0.0, 0.4], [0.5, 0.1, 0.5]]
+        assert set(elbow.inverse_kinematics(targets).owner) == {1}
+        solutions = elbow.inverse_kinematics(targets, best=True)
+        assert (solutions.owner == 0).sum() == 1
+        assert solutions.position_error[0] == pytest.approx(2.0 - 0.8, abs=1e-6)
+        assert solutions.position_error[1:].max() <= 1e-9

@@ -10,7 +10,7 @@ import pytest
 from kinarm.envs import ReachEnv, ReachGoalEnv
 from kinarm.errors import InvalidInputError, MissingExtraError, PolicyFileError
 from kinarm.policies import Policy
-from kinarm.policies.conversion.sb3 import sb3_model
+from kinarm.policies.conversion.models import sb3_model
 from kinarm.problem import PROBLEMS
 from kinarm.simulator import Simulator
 

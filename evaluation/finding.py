@@ -1,0 +1,167 @@
+"""Contestants by name: of files, models and modules; and in a wrapper."""
+
+import inspect
+import re
+import sys
+from contextlib import suppress
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+from kinarm._files import first_line
+from kinarm.errors import InvalidInputError, UnknownNameError
+from kinarm.evaluation.contestants import UNTRAINED, Contestant, Predictor
+from kinarm.evaluation.predictors import Actor, Wrapper
+from kinarm.policies.conversion.models import RecurrentModelError
+from kinarm.policies.conversion.sb3 import native_model
+from kinarm.policies.library import models_in, policy_files
+from kinarm.policies.policy import Policy
+from kinarm.policies.provenance import normalization_remark
+from kinarm.problem import ProblemLike
+from kinarm.simulator import PolicyFunction
+
+
+def find_contestants(
+    name_or_file: str | Path,
+    problem: ProblemLike | None = None,
+    vec_normalize: str | Path | None = None,
+    wrapper: str | Wrapper | None = None,
+) -> tuple[Contestant, ...]:
+    """Find what a name stands for.
+
+    Parameters
+    ----------
+    name_or_file : str or Path
+        A baseline, ``"oracle"``, a shipped policy, a group of them (all
+        training seeds), ``"best"``, a policy file, a model of Stable-Baselines3
+        (.zip), a folder of either, or ``"module:function"``. A model and a
+        module run code: open only those that you trust.
+    problem : ReachProblem, str or Path, optional
+        What a model is for, as its file does not say, or the best shipped
+        policy; others say it themselves.
+    vec_normalize : str or Path, optional
+        Statistics of a model's observations; see
+        `kinarm.policies.Policy.from_sb3`.
+    wrapper : str or callable, optional
+        Function from an environment to a wrapped one, or its
+        ``"module:function"``: policies face the trials in it. It gets a
+        `kinarm.ReachEnv`; or, if its argument is called ``venv``, a ``VecEnv``
+        of Stable-Baselines3.
+    """
+    if wrapper is not None:
+        if not callable(wrapper):
+            name, wrapper = wrapper, _imported(wrapper, "wrapper")
+            if not callable(wrapper):
+                raise InvalidInputError(f"wrapper {name!r} is no function: it is {wrapper!r}")
+        else:
+            name = getattr(wrapper, "__name__", type(wrapper).__name__)
+        found = _find(name_or_file, problem, vec_normalize, wrapped=True)
+        return tuple(each.in_wrapper(wrapper, name) for each in found)
+    return _find(name_or_file, problem, vec_normalize, wrapped=False)
+
+
+def _find(
+    name_or_file: str | Path,
+    problem: ProblemLike | None,
+    vec_normalize: str | Path | None,
+    *,
+    wrapped: bool,
+) -> tuple[Contestant, ...]:
+    """What a name stands for, before it is put into a wrapper."""
+    text = str(name_or_file)
+    if text in UNTRAINED:
+        return (UNTRAINED[text],)
+    models = [Path(text)] if text.endswith(".zip") else models_in(Path(text))
+    if models:
+        settings = (problem, vec_normalize)
+        return tuple(_model_contestant(path, *settings, wrapped=wrapped) for path in models)
+    if is_import_path(text):
+        return (_imported_contestant(text),)
+    try:
+        paths = policy_files(name_or_file, problem)
+    except UnknownNameError as error:
+        available = (*UNTRAINED, *error.available, "path/to/model.zip", "module:function")
+        raise UnknownNameError(error.kind, error.given, available) from None
+    return tuple(
+        Contestant.from_policy(path.stem, Policy.load(path), path.resolve()) for path in paths
+    )
+
+
+def contestant_of(
+    policy: str | Path | Policy | Contestant | PolicyFunction | Predictor,
+    problem: ProblemLike | None,
+    wrapper: Wrapper | None = None,
+) -> Contestant:
+    """Enter a policy, the first of a name or file, or a function."""
+    if isinstance(policy, str | Path):
+        return find_contestants(policy, problem, wrapper=wrapper)[0]
+    if wrapper is not None:
+        name = getattr(wrapper, "__name__", type(wrapper).__name__)
+        return contestant_of(policy, problem).in_wrapper(wrapper, name)
+    if isinstance(policy, Contestant):
+        return policy
+    if isinstance(policy, Policy):
+        made = policy.provenance
+        return Contestant.from_policy(
+            f"{made.algorithm}-{made.recipe}-{policy.problem.name}", policy
+        )
+    name = getattr(policy, "__name__", None) or type(policy).__name__
+    return Contestant.from_function(name, policy)
+
+
+def _model_contestant(
+    path: Path, problem: ProblemLike | None, vec_normalize: str | Path | None, *, wrapped: bool
+) -> Contestant:
+    """A model of Stable-Baselines3: converted, or as it is if it needs more."""
+    try:
+        if not wrapped:
+            with suppress(RecurrentModelError):
+                policy = Policy.from_sb3(path, problem, vec_normalize)
+                return Contestant.from_policy(path.stem, policy, path.resolve())
+        model, statistics, origin = native_model(path, problem, vec_normalize, wrapped=wrapped)
+    except InvalidInputError as error:
+        raise InvalidInputError(f"{str(path)!r}: {error}") from error
+    return Contestant.from_actor(
+        path.stem,
+        Actor(model.policy, statistics),
+        algorithm=model.algorithm,
+        recipe="sb3",
+        seed=model.attributes.get("seed"),
+        source=path.resolve(),
+        remarks=(normalization_remark({"vec_normalize": origin}),),
+    )
+
+
+def is_import_path(text: str) -> bool:
+    """Whether a text has the form ``module:function``."""
+    return re.fullmatch(r"[A-Za-z_][\w.]*:[A-Za-z_]\w*", text) is not None
+
+
+def _imported_contestant(name: str) -> Contestant:
+    """A policy or function of a module."""
+    found = _imported(name, "policy")
+    if isinstance(found, Policy):
+        return Contestant.from_policy(name, found)
+    return Contestant.from_function(name, found)
+
+
+def _imported(name: str, kind: str) -> Any:
+    """What ``module:name`` is, perhaps of the current directory; ``kind`` is for messages."""
+    module_name, _, attribute = name.partition(":")
+    if str(Path.cwd()) not in sys.path:
+        sys.path.insert(0, str(Path.cwd()))
+    import_module("kinarm.envs")  # the module may make one by its id
+    try:
+        module = import_module(module_name)
+    except Exception as error:  # a module can raise anything
+        raise InvalidInputError(
+            f"cannot import {module_name!r} of {kind} {name!r}: {first_line(error)}"
+        ) from error
+    if not hasattr(module, attribute):
+        offered = (
+            key
+            for key, each in vars(module).items()
+            if key[0] != "_" and (hasattr(each, "predict") or inspect.isfunction(each))
+        )
+        raise UnknownNameError(f"name in module {module_name}:", attribute, offered)
+    return getattr(module, attribute)

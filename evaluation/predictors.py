@@ -1,0 +1,183 @@
+"""Policies that choose actions in Python: with a memory, and in a wrapper of their own."""
+
+import inspect
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
+
+import gymnasium
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from kinarm.envs import ReachEnv
+from kinarm.episodes import Rollouts
+from kinarm.evaluation.trials import TrialSet
+from kinarm.kernels.compiling import Array
+from kinarm.policies.policy import Policy
+
+Wrapper = Callable[[Any], Any]
+"""Wraps an environment: one of Gymnasium, or ``venv``, a ``VecEnv`` of Stable-Baselines3."""
+
+Memory = Any
+"""What a policy remembers of a batch of episodes; None at their start."""
+
+
+@dataclass(frozen=True, eq=False)
+class Actor:
+    """Something that chooses actions for a batch of episodes.
+
+    Attributes
+    ----------
+    policy : callable or predictor
+        A function of observations, or what has a ``predict``.
+    statistics : VecNormalize or None
+        What normalises its observations.
+    """
+
+    policy: Any
+    statistics: Any = None
+
+    @classmethod
+    def of(cls, policy: Any) -> "Actor":
+        """Take a policy with the statistics of its environment, if it has some."""
+        return cls(policy, getattr(policy, "get_vec_normalize_env", lambda: None)())
+
+    @cached_property
+    def _options(self) -> set[str]:
+        """Which of its arguments ``predict`` takes."""
+        predict = getattr(self.policy, "predict", None)
+        known = inspect.signature(predict).parameters if predict else ()
+        return {"state", "episode_start", "deterministic"} & {*known}
+
+    @property
+    def remembers(self) -> bool:
+        """Whether it takes and returns a memory, as models of Stable-Baselines3 do."""
+        return "state" in self._options and not isinstance(self.policy, Policy)
+
+    def actions(self, observations: Array) -> ArrayLike:
+        """Choose actions, shape (n, n_actions), without a memory."""
+        return self(observations, None, np.ones(len(observations), bool))[0]
+
+    def __call__(
+        self, observations: Any, memory: Memory, episode_start: NDArray[np.bool_]
+    ) -> tuple[ArrayLike, Memory]:
+        """Choose actions, shape (n, n_actions), and what to remember.
+
+        Parameters
+        ----------
+        observations : array_like or mapping
+            Of n episodes.
+        memory, episode_start : object, ndarray of bool, shape (n,)
+            What was remembered, and which episodes begin.
+        """
+        if self.statistics is not None:
+            observations = self.statistics.normalize_obs(observations)
+        if not hasattr(self.policy, "predict"):
+            return self.policy(observations), None
+        given = {"state": memory, "episode_start": episode_start, "deterministic": True}
+        answer = self.policy.predict(observations, **{name: given[name] for name in self._options})
+        return answer if isinstance(answer, tuple) else (answer, None)
+
+
+def run_remembering(actor: Actor, trials: TrialSet, *, record: bool = False) -> Rollouts:
+    """Run trials with one memory for all of them."""
+    n = len(trials)
+    seen, memory, start = np.zeros((n, trials.simulator.n_observations)), None, np.ones(n, bool)
+
+    def actions(observations: Array, rows: NDArray[np.int64]) -> Array:
+        nonlocal memory, start
+        seen[rows] = observations
+        chosen, memory = actor(seen, memory, start)
+        start = np.zeros(n, bool)
+        return np.asarray(chosen)[rows]
+
+    return trials.simulator.rollout(actions, trials.starts, trials.goals, record=record)
+
+
+def run_wrapped(
+    actor: Actor, wrapper: Wrapper, trials: TrialSet, *, record: bool = False
+) -> Rollouts:
+    """Run trials in a wrapper, and then the actions that arrived at the arm."""
+    parameters = [*inspect.signature(wrapper).parameters]
+    run = _in_batch if parameters[:1] == ["venv"] else _one_by_one
+    simulator = trials.simulator
+    actions = np.zeros((len(trials), simulator.task.horizon, simulator.n_actions))
+    run(actor, wrapper, trials, actions)
+    return simulator.rollout_actions(actions, trials.starts, trials.goals, record=record)
+
+
+class Arrived(gymnasium.Wrapper[Any, Any, Any, Any]):
+    """Keeps the actions that arrive at the arm, in rows of ``kept``."""
+
+    kept: Array
+    count: int
+
+    def reset(self, **settings: Any) -> tuple[Any, dict[str, Any]]:
+        """Begin an episode."""
+        self.count = 0
+        return self.env.reset(**settings)
+
+    def step(self, action: Any) -> tuple[Any, Any, bool, bool, dict[str, Any]]:
+        """Keep an action, and pass it on."""
+        if self.count < len(self.kept):
+            self.kept[self.count] = action
+        self.count += 1
+        return self.env.step(action)
+
+
+def _one_by_one(actor: Actor, wrapper: Wrapper, trials: TrialSet, actions: Array) -> None:
+    """Run trials in a wrapped environment of Gymnasium; fill in the actions."""
+    arrived = Arrived(ReachEnv(trials.problem))
+    env = wrapper(arrived)
+    for trial, (start, goal) in enumerate(zip(trials.starts, trials.goals, strict=True)):
+        arrived.kept = actions[trial]
+        observation, _ = env.reset(seed=trial, options={"start": start, "goal": goal})
+        memory, first, over = None, np.ones(1, dtype=bool), False
+        while not over:
+            chosen, memory = actor(_batch(observation), memory, first)
+            observation, _, terminated, truncated, _ = env.step(np.asarray(chosen)[0])
+            over, first = terminated or truncated, np.zeros(1, dtype=bool)
+    env.close()
+
+
+def _batch(observation: Any) -> Any:
+    if isinstance(observation, dict):
+        return {key: np.asarray(part)[None] for key, part in observation.items()}
+    return np.asarray(observation)[None]
+
+
+def _in_batch(actor: Actor, wrapper: Wrapper, trials: TrialSet, actions: Array) -> None:
+    """Run trials in a wrapped ``VecEnv`` of Stable-Baselines3; fill in the actions."""
+    from stable_baselines3.common.vec_env import VecEnvWrapper, unwrap_vec_normalize
+
+    from kinarm.policies import sb3_vec_env
+
+    steps = iter(range(actions.shape[1]))
+    over = np.zeros(len(trials), dtype=bool)
+
+    class ArrivedBatch(VecEnvWrapper):
+        """Keeps the actions that arrive at arms whose trials are not over."""
+
+        def reset(self) -> Any:
+            return self.venv.reset()
+
+        def step_async(self, given: NDArray[Any]) -> None:
+            actions[~over, next(steps)] = given[~over]
+            self.venv.step_async(given)
+
+        def step_wait(self) -> Any:
+            return self.venv.step_wait()
+
+    arms = sb3_vec_env(trials.problem, len(trials), seed=0)
+    pairs = zip(trials.starts, trials.goals, strict=True)
+    arms.set_options([{"start": start, "goal": goal} for start, goal in pairs])
+    venv = wrapper(ArrivedBatch(arms))
+    if (own := unwrap_vec_normalize(venv)) is not None:
+        own.training, actor = False, replace(actor, statistics=None)
+    observations, memory, start = venv.reset(), None, np.ones(len(trials), dtype=bool)
+    while not over.all():
+        chosen, memory = actor(observations, memory, start)
+        observations, _, start, _ = venv.step(np.asarray(chosen))
+        over |= start
+    venv.close()
