@@ -155,7 +155,10 @@ class Contestant:
                 f"{name!r} is neither a function of observations nor has a method predict: "
                 f"it is {function!r}"
             )
-        return cls.from_actor(name, Actor.of(function), algorithm="function")
+        actor = Actor.of(function)
+        origin = "VecNormalize of its environment" if actor.statistics is not None else None
+        remarks = tuple(filter(None, [normalization_remark({"vec_normalize": origin})]))
+        return cls.from_actor(name, actor, algorithm="function", remarks=remarks)
 
     @classmethod
     def from_actor(cls, name: str, actor: Actor, **about: Any) -> "Contestant":

@@ -256,14 +256,11 @@ def evaluate(
     allow_other_arm : bool
         Whether a policy may face an arm that it was not trained for.
     oracle : bool
-        Whether to bound what any policy could do, in the first 2000 trials at
-        most.
+        Whether to bound what any policy could do, in 2000 trials at most.
     hold : bool
-        Whether to run the trials once more without an end at success; see
-        `Evaluation`.
+        Whether to run the trials once more without an end at success.
     wrapper : callable, optional
-        Function from an environment to a wrapped one, in which the policy faces
-        the trials; see `find_contestants`.
+        The policy faces the trials in it; see `find_contestants`.
     **overrides
         Changes of the problem, such as ``tolerance``; see
         `kinarm.ReachProblem.replace`.
@@ -271,8 +268,7 @@ def evaluate(
     Raises
     ------
     InvalidInputError
-        If a number is out of range, or no problem is given for an untrained
-        policy.
+        If a number is out of range, or an untrained policy has no problem.
     PolicyFileError
         If the policy cannot be read, was trained for another arm, or does not
         fit this one.

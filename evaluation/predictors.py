@@ -8,6 +8,7 @@ from typing import Any
 
 import gymnasium
 import numpy as np
+from gymnasium.spaces import Box
 from numpy.typing import ArrayLike, NDArray
 
 from kinarm.envs import ReachEnv
@@ -71,6 +72,9 @@ class Actor:
         memory, episode_start : object, ndarray of bool, shape (n,)
             What was remembered, and which episodes begin.
         """
+        space = getattr(self.policy, "observation_space", None)
+        if isinstance(space, Box):
+            observations = np.asarray(observations, dtype=space.dtype)
         if self.statistics is not None:
             observations = self.statistics.normalize_obs(observations)
         if not hasattr(self.policy, "predict"):

@@ -195,7 +195,6 @@ class ReplayRequest(ProblemOptions):
 
     def _write(self, report: Callable[[str], object]) -> "ReplayPage":
         from kinarm.evaluation.replay.choosing import chosen_recordings
-        from kinarm.policies.provenance import normalization_remark
         from kinarm.recording import save_recordings
         from kinarm.viewer import replay_page
 
@@ -212,10 +211,9 @@ class ReplayRequest(ProblemOptions):
         if self.record is not None:
             save_recordings(self.record, [recording for run in runs for recording in run])
         page.save(out)
-        for recording in (run[0] for run in runs):
-            policy = recording.provenance.get("policy") or {}
-            if remark := normalization_remark(policy.get("config", {})):
-                report(f"{recording.policy}: {remark}")
+        for note in dict.fromkeys(run[0].provenance.get("note") for run in runs):
+            if note:
+                report(note)
         if groups:
             report(heading)
             for group, count in Counter(groups).items():

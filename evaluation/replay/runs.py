@@ -65,6 +65,7 @@ def record(
             "policy": made,
             "versions": package_versions(),
             "commit": source_commit(),
+            **({"note": contestant.note} if contestant.note else {}),
         },
     )
 

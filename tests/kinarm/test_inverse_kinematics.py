@@ -360,7 +360,8 @@ class TestFewAxes:
 
     def test_the_nearest_pose_is_given_where_there_is_none(self, rounded):
         pose = np.eye(4)
-        pose[:3, 3] = [0.2, 0.1, 0.3]  # the tool up, at any turn: another than the arm can have
+        pose[:3, :3] = [[1, 0, 0], [0, 0, 1], [0, -1, 0]]  # across the arm, which has no joint so
+        pose[:3, 3] = [0.2, 0.0, 0.3]
         assert len(rounded.inverse_kinematics(pose)) == 0
         nearest = rounded.inverse_kinematics(pose, best=True)
         assert (nearest.owner == [0]).all()
