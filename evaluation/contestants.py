@@ -77,7 +77,7 @@ class Contestant:
     def note(self) -> str:
         """A remark in one line, such as the statistics in use; empty if there is none."""
         config = self.policy.provenance.config if self.policy else {}
-        remarks = [*filter(None, [normalization_remark(config)]), *self.remarks]
+        remarks = [*filter(None, [normalization_remark(config), *self.remarks])]
         return f"{self.name}: {'; '.join(remarks)}" if remarks else ""
 
     @property
@@ -157,8 +157,8 @@ class Contestant:
             )
         actor = Actor.of(function)
         origin = "VecNormalize of its environment" if actor.statistics is not None else None
-        remarks = tuple(filter(None, [normalization_remark({"vec_normalize": origin})]))
-        return cls.from_actor(name, actor, algorithm="function", remarks=remarks)
+        remark = normalization_remark({"vec_normalize": origin})
+        return cls.from_actor(name, actor, algorithm="function", remarks=(remark,))
 
     @classmethod
     def from_actor(cls, name: str, actor: Actor, **about: Any) -> "Contestant":

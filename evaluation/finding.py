@@ -48,16 +48,20 @@ def find_contestants(
         `kinarm.ReachEnv`; or, if its argument is called ``venv``, a ``VecEnv``
         of Stable-Baselines3.
     """
-    if wrapper is not None:
-        if not callable(wrapper):
-            name, wrapper = wrapper, _imported(wrapper, "wrapper")
-            if not callable(wrapper):
-                raise InvalidInputError(f"wrapper {name!r} is no function: it is {wrapper!r}")
-        else:
-            name = getattr(wrapper, "__name__", type(wrapper).__name__)
-        found = _find(name_or_file, problem, vec_normalize, wrapped=True)
-        return tuple(each.in_wrapper(wrapper, name) for each in found)
-    return _find(name_or_file, problem, vec_normalize, wrapped=False)
+    found = _find(name_or_file, problem, vec_normalize, wrapped=wrapper is not None)
+    if wrapper is None:
+        return found
+    if callable(wrapper):
+        return tuple(each.in_wrapper(wrapper, _name_of(wrapper)) for each in found)
+    function = _imported(wrapper, "wrapper")
+    if not callable(function):
+        raise InvalidInputError(f"wrapper {wrapper!r} is no function: it is {function!r}")
+    return tuple(each.in_wrapper(function, wrapper) for each in found)
+
+
+def _name_of(function: Any) -> str:
+    """What a function, or an object that is used as one, is called."""
+    return getattr(function, "__name__", None) or type(function).__name__
 
 
 def _find(
@@ -96,8 +100,7 @@ def contestant_of(
     if isinstance(policy, str | Path):
         return find_contestants(policy, problem, wrapper=wrapper)[0]
     if wrapper is not None:
-        name = getattr(wrapper, "__name__", type(wrapper).__name__)
-        return contestant_of(policy, problem).in_wrapper(wrapper, name)
+        return contestant_of(policy, problem).in_wrapper(wrapper, _name_of(wrapper))
     if isinstance(policy, Contestant):
         return policy
     if isinstance(policy, Policy):
@@ -105,8 +108,7 @@ def contestant_of(
         return Contestant.from_policy(
             f"{made.algorithm}-{made.recipe}-{policy.problem.name}", policy
         )
-    name = getattr(policy, "__name__", None) or type(policy).__name__
-    return Contestant.from_function(name, policy)
+    return Contestant.from_function(_name_of(policy), policy)
 
 
 def _model_contestant(

@@ -296,5 +296,4 @@ def _home(home: ArrayLike | None, chain: Chain, names: tuple[str, ...]) -> NDArr
     """Check a home configuration, or take zero clipped to the limits."""
     if home is None:
         return np.clip(np.zeros(chain.n_joints), chain.lower, chain.upper)
-    finite_array("home", home, (chain.n_joints,))
-    return within_limits("home", home, chain, names)
+    return within_limits("home", finite_array("home", home, (chain.n_joints,)), chain, names)

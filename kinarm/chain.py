@@ -4,9 +4,9 @@ from typing import NamedTuple
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
-from kinarm.errors import InvalidInputError, finite_array
+from kinarm.errors import InvalidInputError
 
 FRAME_KINDS = (pin.FrameType.JOINT, pin.FrameType.BODY, pin.FrameType.FIXED_JOINT)
 """Kinds of frames; the first kind counts for a name."""
@@ -186,7 +186,7 @@ def point_speed(chain: Chain, axis: int, link: int, points: NDArray[np.float64])
 
 
 def within_limits(
-    name: str, configurations: ArrayLike, chain: Chain, joint_names: tuple[str, ...]
+    name: str, configurations: NDArray[np.float64], chain: Chain, joint_names: tuple[str, ...]
 ) -> NDArray[np.float64]:
     """Clip configurations that rounding put beyond the limits, and refuse those farther out.
 
@@ -194,7 +194,7 @@ def within_limits(
     ----------
     name : str
         What they are, for messages.
-    configurations : array_like, shape (n_joints,) or (n, n_joints)
+    configurations : ndarray, shape (n_joints,) or (n, n_joints)
         Joint positions [rad or m].
     chain, joint_names
         The arm.
@@ -204,15 +204,13 @@ def within_limits(
     InvalidInputError
         If one lies beyond a limit by more than `ROUNDING`.
     """
-    shape = (chain.n_joints,) if np.ndim(configurations) == 1 else (None, chain.n_joints)
-    given = finite_array(name, configurations, shape)
-    if not ((given < chain.lower) | (given > chain.upper)).any():
-        return given
-    clipped = np.clip(given, chain.lower, chain.upper)
-    beyond = np.abs(given - clipped) > ROUNDING
+    if not ((configurations < chain.lower) | (configurations > chain.upper)).any():
+        return configurations
+    clipped = np.clip(configurations, chain.lower, chain.upper)
+    beyond = np.abs(configurations - clipped) > ROUNDING
     if beyond.any():
         *row, joint = (int(index) for index in np.argwhere(beyond)[0])
-        value = given[(*row, joint)]
+        value = configurations[(*row, joint)]
         raise InvalidInputError(
             f"{name}{row or ''} lies outside the limits: {joint_names[joint]} at {value:.6g}, "
             f"{chain.lower[joint]:.6g} to {chain.upper[joint]:.6g} allowed"

@@ -73,7 +73,8 @@ class World(InverseKinematics):
         arm, starts = self.arm, np.empty((len(self.problem.task.starts), self.arm.n_joints))
         for number, start in enumerate(self.problem.task.starts):
             name = f"task.starts[{number}]"
-            starts[number] = within_limits(name, start, arm.chain, arm.joint_names)
+            given = finite_array(name, start, (arm.n_joints,))
+            starts[number] = within_limits(name, given, arm.chain, arm.joint_names)
             pair = self.contact_model.contact_pair(starts[number])
             if pair is not None:
                 raise ProblemError(f"{name} is in contact: {pair[0]} touches {pair[1]}")
