@@ -17,7 +17,7 @@ from kinarm.evaluation.bounds import oracle_bounds
 from kinarm.evaluation.outcomes import Holding
 from kinarm.evaluation.predictors import Actor, Wrapper, run_remembering, run_wrapped
 from kinarm.evaluation.trials import TrialSet, trial_generator
-from kinarm.networks import Networks
+from kinarm.networks import Layer, Networks
 from kinarm.observation import observation_size
 from kinarm.policies.policy import Policy
 from kinarm.policies.provenance import normalization_remark
@@ -189,7 +189,7 @@ def _run(actor: Policy | PolicyFunction, trials: TrialSet, *, record: bool = Fal
 
 def _run_zero(trials: TrialSet, *, record: bool = False) -> Rollouts:
     still = np.zeros((1, trials.simulator.n_actions, trials.simulator.n_observations))
-    network = Networks.linear(still, np.zeros(still.shape[:2]))
+    network = Networks((Layer(still, np.zeros(still.shape[:2])),))
     return trials.simulator.rollout(network, trials.starts, trials.goals, record=record)
 
 

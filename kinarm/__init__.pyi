@@ -25,6 +25,7 @@ from .errors import UnknownNameError as UnknownNameError
 from .errors import WorkerError as WorkerError
 from .inverse_kinematics import InverseSolutions as InverseSolutions
 from .networks import CompiledPolicy as CompiledPolicy
+from .networks import Layer as Layer
 from .networks import Mirror as Mirror
 from .networks import Networks as Networks
 from .problem import PROBLEMS as PROBLEMS

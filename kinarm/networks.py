@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from itertools import pairwise
+from functools import cached_property
+from itertools import chain, pairwise
 from typing import Literal, NamedTuple, Protocol, get_args, runtime_checkable
 
 import numpy as np
@@ -40,12 +41,13 @@ Activation = Literal["linear", "tanh", "relu", "hardtanh", "elu", "leaky_relu", 
 
 
 class Layer(NamedTuple):
-    """An affine map: ``weights @ x + bias``.
+    """An affine map: ``weights @ x + bias``, or a batch of them.
 
     Attributes
     ----------
-    weights : ndarray, shape (n_out, n_in)
-    bias : ndarray, shape (n_out,)
+    weights : ndarray, shape ([n,] n_out, n_in)
+        In the order of PyTorch's ``Linear``.
+    bias : ndarray, shape ([n,] n_out)
     """
 
     weights: Array
@@ -85,11 +87,9 @@ class Networks:
 
     Attributes
     ----------
-    layers : ndarray of int, shape (n_layers + 1,)
-        Widths, from the observation to the action.
-    weights : ndarray, shape (n_networks, n_parameters)
-        Per network and layer, weights (inputs x outputs, row by row), then the
-        bias.
+    layers : tuple of Layer
+        From the observation to the action, each of all networks: weights of
+        shape (n_networks, n_out, n_in), and biases (n_networks, n_out).
     activations : tuple of str
         Function after each layer, the last one before the clip: ``"linear"``,
         ``"tanh"``, ``"relu"``, ``"hardtanh"``, ``"elu"``, ``"leaky_relu"`` or
@@ -98,32 +98,44 @@ class Networks:
         Reflection of goals on the left, and of actions; None for no reflection.
     """
 
-    layers: NDArray[np.int64]
-    weights: Array
+    layers: tuple[Layer, ...]
     activations: tuple[Activation, ...] = ()
     mirror: Mirror | None = None
 
     def __post_init__(self) -> None:
-        widths = np.asarray(self.layers)
-        if widths.ndim != 1 or len(widths) < 2 or (widths < 1).any():
-            raise InvalidInputError(f"layers must hold at least two widths, got {self.layers}")
-        object.__setattr__(self, "layers", widths.astype(np.int64))
-        n_parameters = sum((n_in + 1) * n_out for n_in, n_out in pairwise(self.layers.tolist()))
-        weights = finite_array("weights", self.weights, (None, n_parameters))
-        object.__setattr__(self, "weights", weights)
-        activations = checked_activations(self.activations, len(widths) - 1)
+        if not self.layers:
+            raise InvalidInputError("networks need at least one layer")
+        layers: list[Layer] = []
+        count = width = None
+        for number, (weights, bias) in enumerate(self.layers):
+            # Widths that are not known yet may be any.
+            checked = finite_array(f"weights of layer {number}", weights, (count, None, width))
+            count, width = checked.shape[:2]
+            layers.append(
+                Layer(checked, finite_array(f"bias of layer {number}", bias, (count, width)))
+            )
+        activations = checked_activations(self.activations, len(layers))
+        object.__setattr__(self, "layers", tuple(layers))
         object.__setattr__(self, "activations", activations)
 
-    def __repr__(self) -> str:
-        widths = "-".join(map(str, self.layers.tolist()))
-        return f"Networks({len(self.weights)} of layers {widths})"
+    def __len__(self) -> int:
+        """Number of networks."""
+        return len(self.layers[0].bias)
 
-    @classmethod
-    def linear(cls, matrices: Array, biases: Array) -> Networks:
-        """Linear policies: maps, shape (n, n_actions, n_observations), and biases."""
-        n, n_out, n_in = matrices.shape
-        flat = matrices.transpose(0, 2, 1).reshape(n, -1)
-        return cls(np.array([n_in, n_out]), np.concatenate([flat, biases], axis=1))
+    def __repr__(self) -> str:
+        return f"Networks({len(self)} of layers {'-'.join(map(str, self.widths))})"
+
+    @property
+    def widths(self) -> tuple[int, ...]:
+        """Widths from the observation to the action."""
+        return (self.layers[0].weights.shape[2], *(layer.bias.shape[1] for layer in self.layers))
+
+    @cached_property
+    def parameters(self) -> Array:
+        """What kernels read, shape (n_networks, n_parameters); see `split_parameters`."""
+        n = len(self)
+        parts = ((weights.transpose(0, 2, 1).reshape(n, -1), bias) for weights, bias in self.layers)
+        return np.concatenate([*chain(*parts)], axis=1)
 
     @classmethod
     def collect(cls, policies: Networks | CompiledPolicy | Sequence[CompiledPolicy]) -> Networks:
@@ -145,13 +157,33 @@ class Networks:
                     "policies of one rollout must share layers, functions and mirror, got "
                     f"{first.form[0]} and {other.form[0]}"
                 )
-        return replace(first, weights=np.concatenate([networks.weights for networks in batch]))
+        columns = zip(*(networks.layers for networks in batch), strict=True)
+        layers = (map(np.concatenate, zip(*column, strict=True)) for column in columns)
+        return replace(first, layers=tuple(Layer(*layer) for layer in layers))
 
     @property
     def form(self) -> tuple[object, ...]:
         """All but the weights, to compare."""
         signs = () if self.mirror is None else (tuple(part.tolist()) for part in self.mirror)
-        return tuple(self.layers.tolist()), self.activations, tuple(signs)
+        return self.widths, self.activations, tuple(signs)
+
+
+def split_parameters(parameters: Array, widths: Sequence[int]) -> Iterator[Layer]:
+    """Views of the layers of networks, whose parameters kernels read in this order.
+
+    Each layer's weights come input by input, then its bias.
+
+    Parameters
+    ----------
+    parameters : ndarray, shape (n_networks, n_parameters)
+    widths : sequence of int
+        From the observation to the action.
+    """
+    start = 0
+    for n_in, n_out in pairwise(widths):
+        weights = parameters[:, start : start + n_in * n_out].reshape(-1, n_in, n_out)
+        start += (n_in + 1) * n_out
+        yield Layer(weights.transpose(0, 2, 1), parameters[:, start - n_out : start])
 
 
 def network_control(
@@ -172,13 +204,13 @@ def network_control(
         Number of episodes, and lengths of observation and action.
     """
     networks = Networks.collect(policies)
-    given = (int(networks.layers[0]), int(networks.layers[-1]))
+    given = (networks.widths[0], networks.widths[-1])
     if given != widths:
         raise InvalidInputError(
             f"the policy maps {given[0]} observations to {given[1]} actions; the arm has "
             f"{widths[0]} and {widths[1]}"
         )
-    count = len(networks.weights)
+    count = len(networks)
     if policy_index is None:
         if count not in (1, n):
             raise InvalidInputError(f"{count} policies for {n} episodes: give policy_index")
@@ -189,8 +221,8 @@ def network_control(
         if not whole or (n and not 0 <= index.min() <= index.max() < count):
             raise InvalidInputError(f"policy_index must hold {n} whole numbers in 0..{count - 1}")
     control = Control(
-        layers=networks.layers,
-        weights=networks.weights,
+        layers=np.array(networks.widths),
+        weights=networks.parameters,
         policy=index.astype(np.int64),
         activations=np.array([[*ACTIVATIONS].index(name) for name in networks.activations]),
     )

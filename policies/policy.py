@@ -153,11 +153,8 @@ class Policy:
     @cached_property
     def _networks(self) -> Networks:
         first = Layer(*fold_normalizer(*self.layers[0], self.mean, self.std))
-        layers = (first, *self.layers[1:])
-        widths = [self.n_observations, *(len(layer.bias) for layer in layers)]
-        parts = chain(*((weights.T.reshape(-1), bias) for weights, bias in layers))
-        weights = np.concatenate([*parts])[None]
-        return Networks(np.array(widths), weights, self.activations, self.mirror)
+        batches = (Layer(weights[None], bias[None]) for weights, bias in (first, *self.layers[1:]))
+        return Networks(tuple(batches), self.activations, self.mirror)
 
     @classmethod
     def from_sb3(

@@ -108,7 +108,8 @@ class ARSState(TrainingState):
     Parameters
     ----------
     theta : ndarray, shape (n_actions, n_observations) or (1, n_parameters)
-        Parameters of a linear policy, or of a network as in `kinarm.Networks`.
+        Parameters of a linear policy, or of a network as in
+        `kinarm.networks.split_parameters`.
     normalizer : Normalizer
         Statistics mu and Sigma of the observations.
     generator : dict

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from kinarm.episodes import Rollouts
 from kinarm.failed_scenarios import FailedScenarios, StartsAndGoals
 from kinarm.kernels.compiling import Array
-from kinarm.networks import Mirror, Networks
+from kinarm.networks import Layer, Mirror, Networks
 from kinarm.policies.ars import ARSConfig, ARSState
 from kinarm.policies.ars.networks import (
     first_deviations,
@@ -24,7 +24,7 @@ from kinarm.policies.learners import CurvePoint
 from kinarm.policies.library import starting_policy, statistics
 from kinarm.policies.mirror import problem_mirror
 from kinarm.policies.normalizer import Normalizer, input_scale
-from kinarm.policies.policy import Layer, Policy, layer_widths
+from kinarm.policies.policy import Policy, layer_widths
 from kinarm.policies.provenance import Provenance
 from kinarm.randomness import Stream, stream_generator
 from kinarm.simulator import Simulator
@@ -182,7 +182,7 @@ def perturbed_policies(theta: Array, step: Array, normalizer: Normalizer) -> Net
     maps = np.concatenate([theta + step, theta - step]) * input_scale(normalizer.std)
     by_input = np.ascontiguousarray(maps.transpose(2, 0, 1))
     shifts = (by_input * normalizer.mean[:, None, None]).sum(axis=0)
-    return Networks.linear(maps, 0.0 - shifts)
+    return Networks((Layer(maps, 0.0 - shifts),))
 
 
 def mean_and_deviation(values: Array) -> tuple[float, float]:

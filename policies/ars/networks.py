@@ -1,11 +1,10 @@
 """Small networks with tanh as policies of Augmented Random Search.
 
-Parameters are in one row, in the order of `kinarm.Networks`.
+Parameters are in one row, in the order of `kinarm.networks.split_parameters`.
 """
 
 import math
-from collections.abc import Iterator, Sequence
-from itertools import chain, pairwise
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -13,10 +12,10 @@ from kinarm.errors import InvalidInputError
 from kinarm.kernels.compiling import Array, inlined, kernel
 from kinarm.kernels.elementary import LOG_2, LOG_2_REST, sine_cosine
 from kinarm.kernels.lanes import LANES, as_lanes, power_of_two, select
-from kinarm.networks import Networks
+from kinarm.networks import Layer, Networks, split_parameters
 from kinarm.observation import part_slices
 from kinarm.policies.normalizer import Normalizer, fold_normalizer
-from kinarm.policies.policy import Layer, Policy
+from kinarm.policies.policy import Policy
 
 DEVIATION = 1.5
 """Standard deviation of units of the first layer, for normalised inputs."""
@@ -83,12 +82,9 @@ def perturbed_networks(
         Statistics, folded in, and widths from observation to action.
     """
     parameters = np.concatenate([theta + step, theta - step])[:, 0]
-    n_in, n_out = widths[:2]
-    weights, bias = next(_layers(parameters, widths))
-    folded = fold_normalizer(weights, bias, normalizer.mean, normalizer.std)
-    rest = parameters[:, (n_in + 1) * n_out :]
-    first = folded[0].transpose(0, 2, 1).reshape(len(parameters), -1)
-    return Networks(np.array(widths), np.concatenate([first, folded[1], rest], axis=1))
+    first, *rest = split_parameters(parameters, widths)
+    folded = fold_normalizer(*first, normalizer.mean, normalizer.std)
+    return Networks((Layer(*folded), *rest))
 
 
 def network_layers(theta: Array, widths: Sequence[int]) -> tuple[Layer, ...]:
@@ -96,23 +92,14 @@ def network_layers(theta: Array, widths: Sequence[int]) -> tuple[Layer, ...]:
 
     Widths are those from observation to action.
     """
-    return tuple(Layer(weights[0], bias[0]) for weights, bias in _layers(theta, widths))
-
-
-def _layers(parameters: Array, widths: Sequence[int]) -> Iterator[tuple[Array, Array]]:
-    """Weights, shape (n, n_out, n_in), and biases, shape (n, n_out), of each layer."""
-    start = 0
-    for n_in, n_out in pairwise(widths):
-        weights = parameters[:, start : start + n_in * n_out].reshape(-1, n_in, n_out)
-        start += (n_in + 1) * n_out
-        yield weights.transpose(0, 2, 1), parameters[:, start - n_out : start]
+    return tuple(Layer(weights[0], bias[0]) for weights, bias in split_parameters(theta, widths))
 
 
 def parameters_of(policy: Policy) -> Array:
     """Parameters of a policy for a training; linear ones have no bias."""
     if len(policy.layers) > 1:
-        parts = chain(*((weights.T.ravel(), bias) for weights, bias in policy.layers))
-        return np.concatenate([*parts])[None]
+        batches = tuple(Layer(weights[None], bias[None]) for weights, bias in policy.layers)
+        return Networks(batches).parameters
     weights, bias = policy.layers[0]
     if bias.any():
         raise InvalidInputError("initial_policy has a bias, which linear policies of ARS have not")

@@ -120,7 +120,7 @@ def ars_digests() -> dict[str, str]:
                 digest(
                     [
                         *(state.theta, state.normalizer.mean, state.normalizer.squares, curve),
-                        *result.policy.networks().weights,
+                        *result.policy.networks().parameters,
                     ]
                 ),
             )

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from kinarm.errors import InvalidInputError
-from kinarm.networks import CompiledPolicy, Mirror, Networks
+from kinarm.networks import CompiledPolicy, Layer, Mirror, Networks, split_parameters
 from kinarm.observation import observation_signs
 
 
@@ -18,38 +18,55 @@ class Offering:
         return self._networks
 
 
-def test_linear_stores_inputs_by_outputs_then_the_bias():
-    matrices = np.array([[[1.0, 2.0, 3.0], [4.0, 5.0, 6.0]]])
-    networks = Networks.linear(matrices, np.array([[7.0, 8.0]]))
-    np.testing.assert_array_equal(networks.layers, [3, 2])
-    np.testing.assert_array_equal(networks.weights, [[1, 4, 2, 5, 3, 6, 7, 8]])
+def test_parameters_are_inputs_by_outputs_then_the_bias():
+    layers = (Layer([[[1.0, 2.0, 3.0], [4.0, 5.0, 6.0]]], [[7.0, 8.0]]), Layer([[[9, 10]]], [[11]]))
+    networks = Networks(layers)
+    assert (networks.widths, len(networks)) == ((3, 2, 1), 1)
+    np.testing.assert_array_equal(networks.parameters, [[1, 4, 2, 5, 3, 6, 7, 8, 9, 10, 11]])
+    for mine, split in zip(layers, split_parameters(networks.parameters, (3, 2, 1)), strict=True):
+        np.testing.assert_array_equal(split.weights, mine.weights)
+        np.testing.assert_array_equal(split.bias, mine.bias)
 
 
 def test_collect_gathers_one_many_or_a_batch():
-    batch = Networks.linear(np.ones((2, 1, 3)), np.zeros((2, 1)))
-    one = Offering(Networks.linear(np.full((1, 1, 3), 2.0), np.ones((1, 1))))
+    batch = Networks((Layer(np.ones((2, 1, 3)), np.zeros((2, 1))),))
+    one = Offering(Networks((Layer(np.full((1, 1, 3), 2.0), np.ones((1, 1))),)))
     assert Networks.collect(batch) is batch
-    np.testing.assert_array_equal(Networks.collect(one).weights, [[2, 2, 2, 1]])
-    np.testing.assert_array_equal(Networks.collect([one, one]).weights, [[2, 2, 2, 1]] * 2)
+    np.testing.assert_array_equal(Networks.collect(one).parameters, [[2, 2, 2, 1]])
+    np.testing.assert_array_equal(Networks.collect([one, one]).parameters, [[2, 2, 2, 1]] * 2)
     assert isinstance(one, CompiledPolicy)
 
 
 @pytest.mark.parametrize(
-    ("layers", "weights", "message"),
+    ("layers", "message"),
     [
-        ([3, 0], np.zeros((1, 0)), "at least two widths"),
-        ([3, 2], np.zeros((1, 9)), r"weights must have shape \(n, 8\), got \(1, 9\)"),
-        ([3, 2], np.full((1, 8), np.nan), "weights must be finite"),
+        ([], "at least one layer"),
+        ([Layer(np.zeros((2, 3)), np.zeros(2))], r"weights of layer 0 .*\(n, n, n\), got \(2, 3\)"),
+        # As inputs x outputs, the order of other libraries.
+        (
+            [Layer(np.zeros((1, 48, 16)), np.zeros((1, 16)))],
+            r"bias of layer 0 must have shape \(1, 48\), got \(1, 16\)",
+        ),
+        (
+            [Layer(np.zeros((1, 2, 3)), np.zeros((1, 2))), Layer(np.zeros((1, 1, 3)), [[0.0]])],
+            r"weights of layer 1 must have shape \(1, n, 2\), got \(1, 1, 3\)",
+        ),
+        (
+            [Layer(np.zeros((4, 2, 3)), np.zeros((1, 2)))],
+            r"bias of layer 0 must have shape \(4, 2\), got \(1, 2\)",
+        ),
+        ([Layer([[[np.nan]]], [[0.0]])], "weights of layer 0 must be finite"),
     ],
 )
-def test_weights_have_to_fit_the_layers(layers, weights, message):
+def test_layers_have_to_fit(layers, message):
     with pytest.raises(InvalidInputError, match=message):
-        Networks(np.array(layers), weights)
+        Networks(tuple(layers))
 
 
 def test_every_layer_needs_a_function_that_there_is():
+    layer = Layer(np.zeros((1, 2, 3)), np.zeros((1, 2)))
     with pytest.raises(InvalidInputError, match="function 'sine' .*available: linear, tanh, relu"):
-        Networks(np.array([3, 2]), np.zeros((1, 8)), activations=("sine",))
+        Networks((layer,), activations=("sine",))
 
 
 class TestForm:
@@ -57,12 +74,13 @@ class TestForm:
 
     def make(self, n_inputs=3, **changes):
         settings = {"activations": ("tanh",), "mirror": Mirror(-np.ones(3), np.ones(2)), **changes}
-        weights = np.random.default_rng(0).normal(size=(1, 2 * n_inputs + 2))
-        return Offering(Networks(np.array([n_inputs, 2]), weights, **settings))
+        rng = np.random.default_rng(0)
+        layer = Layer(rng.normal(size=(1, 2, n_inputs)), rng.normal(size=(1, 2)))
+        return Offering(Networks((layer,), **settings))
 
     def test_is_kept_by_a_batch(self):
         batch = Networks.collect([self.make() for _ in range(4)])
-        assert batch.weights.shape == (4, 8)
+        assert batch.parameters.shape == (4, 8)
         assert batch.form == self.make().networks().form
 
     @pytest.mark.parametrize(

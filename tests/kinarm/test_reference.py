@@ -8,7 +8,7 @@ import pytest
 from reference_episodes import assert_equal_outcome, compare_actions, scripted
 from simulators import changed
 
-from kinarm.networks import ACTIVATIONS, Networks
+from kinarm.networks import ACTIVATIONS, Layer, Networks, split_parameters
 from kinarm.policies.library import load_policy
 from kinarm.problem import ReachProblem
 from kinarm.reference import ReferenceSimulator
@@ -41,31 +41,32 @@ def trained_networks(name, count, seed):
     """A shipped policy, more and more disturbed."""
     trained = load_policy(name).networks()
     spread = np.linspace(0, 0.4, count)[:, None]
-    gains = 1 + spread * np.random.default_rng(seed).normal(size=(count, trained.weights.size))
-    return replace(trained, weights=trained.weights * gains)
+    size = trained.parameters.size
+    gains = 1 + spread * np.random.default_rng(seed).normal(size=(count, size))
+    layers = split_parameters(trained.parameters * gains, trained.widths)
+    return replace(trained, layers=tuple(layers))
 
 
 def random_networks(simulator, count, seed, hidden=(), **functions):
     rng = np.random.default_rng(seed)
     widths = [simulator.n_observations, *hidden, simulator.n_actions]
-    parts = []
-    for n_in, n_out in itertools.pairwise(widths):
-        parts.append(rng.normal(size=(count, n_in * n_out)) * 2 / np.sqrt(n_in))
-        parts.append(rng.normal(size=(count, n_out)) / 4)
-    return Networks(np.array(widths), np.concatenate(parts, axis=1), **functions)
+    layers = tuple(
+        Layer(
+            rng.normal(size=(count, n_out, n_in)) * 2 / np.sqrt(n_in),
+            rng.normal(size=(count, n_out)) / 4,
+        )
+        for n_in, n_out in itertools.pairwise(widths)
+    )
+    return Networks(layers, **functions)
 
 
 def evaluate(networks, index, observation):
     """One network in plain NumPy."""
-    x, offset, widths, mirror = observation, 0, networks.layers, networks.mirror
+    x, mirror = observation, networks.mirror
     left = mirror is not None and observation[1] > 0
     x = mirror.observations * x if left else x
-    for (n_in, n_out), name in zip(itertools.pairwise(widths), networks.activations, strict=True):
-        size = n_in * n_out
-        weights = networks.weights[index, offset : offset + size].reshape(n_in, n_out)
-        bias = networks.weights[index, offset + size : offset + size + n_out]
-        x = ACTIVATIONS[name](np.einsum("i,ij->j", x, weights) + bias)
-        offset += size + n_out
+    for layer, name in zip(networks.layers, networks.activations, strict=True):
+        x = ACTIVATIONS[name](np.einsum("ji,i->j", layer.weights[index], x) + layer.bias[index])
     action = np.clip(x, -1, 1)
     return mirror.actions * action if left else action
 
@@ -73,7 +74,7 @@ def evaluate(networks, index, observation):
 def compare_networks(simulator, networks, seed, count, atol=1e-12):
     """Run the same episodes on both sides; return how they ended."""
     starts, goals = simulator.sample(np.random.default_rng(seed), count)
-    index = np.arange(count) % len(networks.weights)
+    index = np.arange(count) % len(networks)
     rollouts = simulator.rollout(networks, starts, goals, policy_index=index, record=True)
     reference = ReferenceSimulator(simulator)
     for i in range(count):

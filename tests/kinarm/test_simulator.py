@@ -16,7 +16,7 @@ from kinarm.episodes import COLLISION
 from kinarm.errors import InvalidInputError, KinarmError, StartInContactError
 from kinarm.kernels.rollout import advance, begin
 from kinarm.kernels.screening import screen
-from kinarm.networks import Mirror, Networks
+from kinarm.networks import Layer, Mirror, Networks
 from kinarm.observation import observation_signs
 from kinarm.problem import ReachProblem
 from kinarm.recording import record_path
@@ -32,13 +32,12 @@ RESULTS = ("success", "collision", "steps", "distance", "returns", "configuratio
 def linear_policies(simulator, count, seed):
     rng = np.random.default_rng(seed)
     matrices = rng.normal(size=(count, simulator.n_actions, simulator.n_observations)) / 3
-    return Networks.linear(matrices, rng.normal(size=(count, simulator.n_actions)) / 10)
+    return Networks((Layer(matrices, rng.normal(size=(count, simulator.n_actions)) / 10),))
 
 
 def in_numpy(networks):
-    n_in, n_out = networks.layers
-    weights = networks.weights[0, :-n_out].reshape(n_in, n_out)
-    return lambda x: x @ weights + networks.weights[0, -n_out:]
+    weights, bias = (part[0] for part in networks.layers[0])
+    return lambda x: x @ weights.T + bias
 
 
 def assert_identical(first, second, rows=slice(None)):
@@ -80,7 +79,7 @@ class TestDeterminism:
         for rows in (slice(0, 1), slice(1, 100), slice(100, 600), order):
             index = np.arange(600)[rows]
             split = simulator.rollout(
-                Networks(networks.layers, networks.weights[: index.max() + 1]),
+                Networks((Layer(*(part[: index.max() + 1] for part in networks.layers[0])),)),
                 starts[rows],
                 goals[rows],
                 policy_index=index,
@@ -223,7 +222,7 @@ def asked(simulator, policies=None, starts=HOME, goals=FAR_GOAL, **settings):
 
 
 TWO = {"starts": np.zeros((2, 6)), "goals": np.tile(FAR_GOAL, (2, 1))}
-THREE_POLICIES = Networks.linear(np.zeros((3, 5, 48)), np.zeros((3, 5)))
+THREE_POLICIES = Networks((Layer(np.zeros((3, 5, 48)), np.zeros((3, 5))),))
 
 
 class TestRefusals:
@@ -245,7 +244,7 @@ class TestRefusals:
             ({"policies": np.zeros((1, 63, 5))}, r"actions must have shape \(1, 64, 5\)"),
             ({"policies": lambda _: np.full((1, 5), np.nan)}, "actions must be finite"),
             ({"policies": lambda _: HOME[:, :5], "policy_index": [0]}, "does not apply"),
-            ({"policies": Networks.linear(np.zeros((1, 5, 41)), np.zeros((1, 5)))}, "41 observ"),
+            ({"policies": Networks((Layer(np.zeros((1, 5, 41)), np.zeros((1, 5))),))}, "41 observ"),
             ({"policies": THREE_POLICIES, **TWO}, "3 policies for 2 episodes: give policy_index"),
             *(
                 ({"policies": THREE_POLICIES, **TWO, "policy_index": index}, r"2 .*0\.\.2")

@@ -114,15 +114,14 @@ class TestPolicies:
         seen = rng.normal(size=48)
         scaled = (seen - data.mean(axis=0))[2:] / data.std(axis=0)[2:]
         for k, perturbed in enumerate([*(theta + step), *(theta - step)]):
-            weights = networks.weights[k, :240].reshape(48, 5)
-            action = seen @ weights + networks.weights[k, 240:]
+            action = networks.layers[0].weights[k] @ seen + networks.layers[0].bias[k]
             np.testing.assert_allclose(action, perturbed[:, 2:] @ scaled, rtol=1e-10)
 
     def test_without_normaliser_are_theta_itself(self):
         theta, step = np.random.default_rng(11).normal(size=(2, 5, 48))
-        networks = perturbed_policies(theta, step[None], Normalizer.empty(48))
-        np.testing.assert_array_equal(networks.weights[:, 240:], 0)
-        np.testing.assert_array_equal(networks.weights[1, :240].reshape(48, 5), (theta - step).T)
+        (layer,) = perturbed_policies(theta, step[None], Normalizer.empty(48)).layers
+        np.testing.assert_array_equal(layer.bias, 0)
+        np.testing.assert_array_equal(layer.weights[1], theta - step)
 
 
 def drawn(config, simulator, rng):
@@ -251,15 +250,15 @@ class TestTraining:
         still = np.zeros((1, *state.theta.shape))
         trained = perturbed_policies(state.theta, still, state.normalizer)
         np.testing.assert_allclose(
-            policy.networks().weights, trained.weights[:1], rtol=1e-12, atol=1e-15
+            policy.networks().parameters, trained.parameters[:1], rtol=1e-12, atol=1e-15
         )
 
     def test_constant_inputs_of_the_training_have_weight_zero(self):
         # On one bench the height of the goal never changes, nor does the place of axis 1.
         policy = train_policy(TINY).policy
-        weights = policy.networks().weights[0, :240].reshape(48, 5)
-        np.testing.assert_array_equal(weights[[2, 30, 31, 32]], 0)
-        assert (weights[[0, 1, 3]] != 0).all()
+        weights = policy.networks().layers[0].weights[0]
+        np.testing.assert_array_equal(weights[:, [2, 30, 31, 32]], 0)
+        assert (weights[:, [0, 1, 3]] != 0).all()
 
     def test_linear_schedule_falls_to_zero(self):
         config = ARSConfig(step_size=0.4, step_size_schedule="linear", iterations=4)

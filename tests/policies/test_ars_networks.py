@@ -35,12 +35,7 @@ def forward(layers, inputs):
 
 def by_networks(networks, row, observation):
     """What a row of `Networks` answers, read as its documentation says."""
-    layers, start = [], 0
-    for n_in, n_out in zip(networks.layers, networks.layers[1:], strict=False):
-        weights = networks.weights[row, start : start + n_in * n_out].reshape(n_in, n_out)
-        start += (n_in + 1) * n_out
-        layers.append((weights.T, networks.weights[row, start - n_out : start]))
-    return forward(layers, observation)
+    return forward([(weights[row], bias[row]) for weights, bias in networks.layers], observation)
 
 
 def test_first_network_does_nothing_and_has_lively_inner_layers():
@@ -85,8 +80,8 @@ def test_policy_has_the_trained_parameters():
     normalizer = Normalizer(1, result.policy.mean, result.policy.std**2)
     trained = perturbed_networks(result.state.theta, still, normalizer, (48, 6, 5))
     networks = result.policy.networks()
-    np.testing.assert_array_equal(networks.layers, [48, 6, 5])
-    np.testing.assert_allclose(networks.weights, trained.weights[:1], rtol=1e-12, atol=1e-14)
+    assert networks.widths == (48, 6, 5)
+    np.testing.assert_allclose(networks.parameters, trained.parameters[:1], rtol=1e-12, atol=1e-14)
     assert result.state.theta[0, -6 * 5 - 5 :].any()
 
 

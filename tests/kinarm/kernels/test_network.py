@@ -9,7 +9,7 @@ from numba import njit
 from kinarm.kernels.lanes import LANES, as_numbers
 from kinarm.kernels.network import choose_actions, shared_policy
 from kinarm.kernels.session import work_space
-from kinarm.networks import ACTIVATIONS, Mirror, Networks, network_control
+from kinarm.networks import ACTIVATIONS, Layer, Mirror, Networks, network_control
 
 FUNCTIONS = {
     "linear": lambda x: x,
@@ -41,7 +41,7 @@ def act_all(control, block, observations, actions):
 
 def compiled(networks, observations):
     """Actions of networks, one for each observation or one for all."""
-    count, widths = len(observations), (networks.layers[0], networks.layers[-1])
+    count, widths = len(observations), (networks.widths[0], networks.widths[-1])
     control = network_control(networks, None, count, widths)
     actions = np.full((count, widths[1]), np.nan)
     block, _ = work_space(
@@ -57,17 +57,20 @@ def compiled(networks, observations):
 
 def random_networks(widths, count=1, seed=0, **settings):
     rng = np.random.default_rng(seed)
-    parts = [rng.normal(size=(count, (i + 1) * o)) / np.sqrt(i) for i, o in pairwise(widths)]
-    return Networks(np.array(widths), np.concatenate(parts, axis=1), **settings)
+    layers = tuple(
+        Layer(
+            rng.normal(size=(count, n_out, n_in)) / np.sqrt(n_in),
+            rng.normal(size=(count, n_out)) / np.sqrt(n_in),
+        )
+        for n_in, n_out in pairwise(widths)
+    )
+    return Networks(layers, **settings)
 
 
 def in_numpy(networks, x, index=0):
     """What a network answers, clipped, without a mirror."""
-    start = 0
-    for (n_in, n_out), name in zip(pairwise(networks.layers), networks.activations, strict=True):
-        part = networks.weights[index, start : start + (n_in + 1) * n_out].reshape(n_in + 1, n_out)
-        x = FUNCTIONS[name](x @ part[:-1] + part[-1])
-        start += part.size
+    for layer, name in zip(networks.layers, networks.activations, strict=True):
+        x = FUNCTIONS[name](x @ layer.weights[index].T + layer.bias[index])
     return np.clip(x, -1, 1)
 
 
@@ -105,8 +108,8 @@ def test_functions_are_those_of_torch(name):
         "silu": torch.nn.SiLU(),
     }
     x = np.concatenate([np.linspace(-40, 40, 4001), [-1e3, -1e-9, -0.0, 0.0, 1e-9, 1e3]])[:, None]
-    weights = np.array([[1.0, 0.0, 0.001, 0.0]])
-    networks = Networks(np.array([1, 1, 1]), weights, activations=(name, "linear"))
+    layers = (Layer([[[1.0]]], [[0.0]]), Layer([[[0.001]]], [[0.0]]))
+    networks = Networks(layers, activations=(name, "linear"))
     expected = 0.001 * modules[name](torch.tensor(x)).numpy()
     np.testing.assert_allclose(compiled(networks, x), expected.clip(-1, 1), rtol=0, atol=1e-15)
     np.testing.assert_allclose(0.001 * ACTIVATIONS[name](x), expected, rtol=0, atol=1e-15)
