@@ -9,15 +9,9 @@ from numpy.typing import NDArray
 
 from kinarm.arm import Arm
 from kinarm.arm_specification import ArmFile
-from kinarm.clearance import SAMPLES, ContactStatistics
+from kinarm.clearance import SAMPLES, ContactStatistics, arm_warnings, contact_on_bare_ground
 from kinarm.collision import ContactModel
 from kinarm.evaluation.report.templating import template_environment
-from kinarm.scene import Scene
-
-
-def contact_on_bare_ground(arm: Arm) -> ContactModel:
-    """The pairs of bodies tested for contact where only the arm stands."""
-    return ContactModel.build(arm, Scene(obstacles=(), goal_regions=()))
 
 
 def joint_speeds(arm: Arm) -> str:
@@ -52,6 +46,7 @@ def arm_facts(arm: Arm) -> str:
         shapes=zip(contact.body_names, shapes, strict=False),
         statistics=ContactStatistics.sample(contact),
         untested=untested_pairs(contact),
+        warnings=arm_warnings(arm),
         samples=SAMPLES,
     )
     return text.rstrip()

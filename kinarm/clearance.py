@@ -1,4 +1,4 @@
-"""Distances from contact, frequencies of contact at random, and goals in reach.
+"""Distances from contact, frequencies of contact at random, goals in reach, and warnings.
 
 That no configuration is found for a goal proves nothing; the oracle does.
 """
@@ -12,11 +12,14 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from kinarm._parallel import run_rows
-from kinarm.collision import ContactModel, make_verdicts_reliable
+from kinarm.arm import Arm
+from kinarm.arm_specification import arm_names
+from kinarm.collision import TOUCH_AT_HOME, ContactModel, make_verdicts_reliable
 from kinarm.contact_shapes import enclosing_polytope
 from kinarm.errors import ProblemError
 from kinarm.kernels.closest import Bodies, closest_pairs
 from kinarm.kernels.compiling import Array
+from kinarm.scene import Scene
 
 if TYPE_CHECKING:
     from kinarm.world import World
@@ -236,3 +239,44 @@ def reach_warning(world: "World") -> str | None:
         f"problem {world.problem.name}: no contact-free configuration was found for {missed} of "
         f"{GOALS} goals; see kinarm-problem check"
     )
+
+
+FASTEST = 30.0
+"""Joint speed beyond which a velocity limit is doubtful [rad/s]."""
+
+
+def contact_on_bare_ground(arm: Arm) -> ContactModel:
+    """The pairs of bodies tested for contact where only the arm stands."""
+    return ContactModel.build(arm, Scene(obstacles=(), goal_regions=()))
+
+
+def arm_warnings(arm: Arm) -> list[str]:
+    """What makes the description of an arm doubtful, a line each; nothing of shipped arms.
+
+    These are missing collision shapes, pairs of bodies that are never tested,
+    since they touch at home, and joints faster than 30 rad/s.
+    """
+    lines: list[str] = []
+    if arm.specification.source in arm_names():
+        return lines
+    if not any(shape.parentJoint for shape in arm.geometry.geometryObjects):
+        lines.append("no moving link has a collision shape: it touches nothing, ever")
+    left_out = contact_on_bare_ground(arm).left_out
+    resting = [" and ".join(pair) for pair, why in left_out.items() if why == TOUCH_AT_HOME]
+    if resting:
+        more = f", and {len(resting) - 3} more" if len(resting) > 3 else ""
+        lines.append(
+            "never tested for contact, since they touch at home: "
+            f"{', '.join(resting[:3])}{more}; an arm file can name another home, or say that this "
+            "is meant (allowed_contacts)"
+        )
+    fast = [
+        f"{name} {speed:.0f} rad/s"
+        for name, speed, slides in zip(
+            arm.joint_names, arm.velocity_limits, arm.chain.prismatic, strict=True
+        )
+        if speed > FASTEST and not slides
+    ]
+    if fast:
+        lines.append(f"velocity limits that no arm reaches: {', '.join(fast)}")
+    return lines

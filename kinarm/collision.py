@@ -30,6 +30,9 @@ GUESS, HINT = np.array([1.0, 0.0, 0.0]), np.zeros(2, dtype=np.int32)
 FEW = 4
 """Of up to so many steps in doubt, Coal tells what touches."""
 
+TOUCH_AT_HOME = "touch at home"
+"""Why a pair of an arm is never tested."""
+
 MOUNT_SAMPLES = 721
 """Positions of the first joint that test the mounting."""
 
@@ -309,7 +312,7 @@ def _uninformative_pairs(
                 f"{names[pairs[index].second]} wherever the first joint is"
             )
     return {
-        **dict.fromkeys(resting, "touch at home"),
+        **dict.fromkeys(resting, TOUCH_AT_HOME),
         **dict.fromkeys(always, "the mounting: always touch"),
         **dict.fromkeys(never, "never touch, wherever the first joint is"),
     }

@@ -159,7 +159,9 @@ def _corners(path: Path, scale: NDArray[np.float64]) -> Arrays:
         corners = np.array(mesh.convex.points())
         return {"corners": enclosing_corners(corners) if len(corners) > MANY_VERTICES else corners}
     except (ValueError, RuntimeError) as error:
-        raise ArmError(f"mesh {path.name} cannot be loaded: {first_line(error)}") from error
+        # Coal's reason comes after the place in its sources.
+        reason = str(error).rpartition("message: ")[2]
+        raise ArmError(f"mesh {path.name!r} cannot be loaded: {reason}") from error
 
 
 def enclosing_corners(points: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -90,11 +90,13 @@ class ProblemOptions(Checked):
 
 
 def say_choices(problems: Iterable[ReachProblem]) -> None:
-    """Say on standard error what was chosen for URDFs, a line per arm."""
+    """Say on standard error what was chosen for problems' URDFs, and what is doubtful in them."""
     for specification in dict.fromkeys(problem.arm for problem in problems):
         if specification.source not in arm_names():
             from kinarm.arm import Arm
+            from kinarm.clearance import arm_warnings
 
-            notes = Arm.load(specification).description.notes
-            if notes:
-                sys.stderr.write(f"arm {specification.name}: {'; '.join(notes)}\n")
+            arm = Arm.load(specification)
+            chosen = filter(None, ["; ".join(arm.description.notes)])
+            for line in (*chosen, *arm_warnings(arm)):
+                sys.stderr.write(f"arm {specification.name}: {line}\n")

@@ -113,9 +113,9 @@ def _reduced(path: Path, specification: ArmSpecification) -> Description:
         for name in named:
             if name not in known:
                 raise UnknownNameError(f"{what} of {path.name}:", name, known)
-    for name in moving:
-        if name in kept:
-            notes += _bounded(joints[name], limits)
+    _check_mimics([joints[name] for name in kept])
+    for name in kept:
+        notes += _bounded(joints[name], limits)
     held = _held_positions(joints, moving, kept, asked)
     for name, position in held.items():
         _fix(joints[name], position)
@@ -152,14 +152,21 @@ def _tool_frame(
     return last, (f"tool frame: {last!r}, the last link of the longest chain",)
 
 
+def _check_mimics(chain: list[TreeJoint]) -> None:
+    """Refuse joints that carry the tool and mimic others."""
+    for number, joint in enumerate(chain):
+        if joint.mimics is not None:
+            mend = "hold it (held)"
+            if joint.mimics not in [each.name for each in chain[:number]]:
+                mend += f", or choose a tool frame before it: --tool-frame {joint.parent}"
+            raise ArmError(
+                f"joint {joint.name!r} mimics {joint.mimics!r} and carries the tool: {mend}"
+            )
+
+
 def _bounded(joint: TreeJoint, limits: Mapping[str, tuple[float, float]]) -> tuple[str, ...]:
     """Check a kept joint's limits; return what was chosen."""
     element, name = joint.element, joint.name
-    if joint.mimics is not None:
-        raise ArmError(
-            f"joint {name!r} mimics {joint.mimics!r} and carries the tool: hold it (held), or "
-            "choose a tool frame before it"
-        )
     limit = element.find("limit")
     notes: tuple[str, ...] = ()
     if joint.kind == "continuous":

@@ -73,7 +73,7 @@ def read_robot(path: Path) -> Element:
     """Root of a URDF with only the used elements, and numbers as Python writes them.
 
     Joints get origins and axes. Visual shapes stay unchecked. Raises ArmError if the file is no
-    URDF, a name or shape is missing, or a number is out of range.
+    URDF, or the xacro of one, a name or shape is missing, or a number is out of range.
     """
     try:
         robot = parse_xml(path.read_bytes())
@@ -81,6 +81,11 @@ def read_robot(path: Path) -> Element:
         raise ArmError(f"not a readable URDF: {first_line(error)}") from error
     if robot.tag != "robot":
         raise ArmError(f"not a readable URDF: its root is <{robot.tag}>")
+    if any("xacro}" in str(element.tag) for element in robot.iter()):
+        raise ArmError(
+            "a xacro file, a template of URDFs, which ROS's program makes of it: "
+            f"xacro {path.name} > {path.name.partition('.')[0]}.urdf"
+        )
     for part in (robot, *robot):
         for element in [each for each in part if each.tag not in NEEDED.get(part.tag, (each.tag,))]:
             part.remove(element)

@@ -72,14 +72,15 @@ def test_show_of_an_own_urdf(run, make_joint, make_collision, write_robot, tmp_p
         '<link name="jaw"/><joint name="bite" type="prismatic"><parent link="link_1"/>'
         '<child link="jaw"/><limit lower="0" upper="0.1" velocity="1" effort="0"/></joint>'
     )
-    ball = make_collision('<sphere radius="0.05"/>', xyz="0 0 0.3")
-    path = write_robot([make_joint("prismatic"), make_joint()], {2: ball}, tool=None, extra=extra)
+    shapes = dict.fromkeys((0, 2), make_collision('<sphere radius="0.9"/>'))
+    path = write_robot([make_joint("prismatic"), make_joint()], shapes, tool=None, extra=extra)
     page = tmp_path / "made.html"
     answer = run("kinarm-arms", "show", path, "--tool-frame", "link_2", "--out", page)
     assert (answer.status, answer.err) == (0, "")
     assert "  bite at 0" in answer.out
     assert "  joint_1: -2 to 2 m, 3 m/s" in answer.out
     assert "  joints that do not carry the tool are held: bite" in answer.out
+    assert "  never tested for contact, since they touch at home: link_0 and link_2" in answer.out
     assert page.stat().st_size > 1e5
     check_refused(run("kinarm-arms", "show", path, "--out", page), "exists", "--overwrite")
 

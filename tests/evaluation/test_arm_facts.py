@@ -4,7 +4,8 @@ import pytest
 
 from kinarm.arm import Arm
 from kinarm.arm_specification import AllowedContact
-from kinarm.evaluation.arm_facts import arm_facts, contact_on_bare_ground, untested_pairs
+from kinarm.clearance import contact_on_bare_ground
+from kinarm.evaluation.arm_facts import arm_facts, untested_pairs
 
 
 @pytest.fixture(scope="module")

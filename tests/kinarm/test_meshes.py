@@ -110,6 +110,12 @@ def test_what_is_no_mesh_is_refused(tmp_path, name):
     assert "\n" not in str(caught.value)
 
 
+def test_the_reason_of_a_refused_mesh_is_told(tmp_path):
+    (tmp_path / "empty.stl").write_bytes(bytes(84))
+    with pytest.raises(ArmError, match=r"'empty.stl' cannot be loaded: .*no facets defined"):
+        hull_of_mesh(tmp_path / "empty.stl", np.ones(3))
+
+
 @pytest.mark.parametrize(("number", "reason"), [("nan", "away"), ("1e30", "away"), ("0", "volume")])
 def test_meshes_that_are_refused(tmp_path, number, reason):
     corners = [(0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, number)]

@@ -104,4 +104,5 @@ class TestOptions:
         say_choices([problem, problem, RIGHT])
         assert capsys.readouterr().err == (
             "arm made: tool frame: 'link_1', the last link of the longest chain\n"
+            "arm made: no moving link has a collision shape: it touches nothing, ever\n"
         )

@@ -81,10 +81,16 @@ class TestMimickingJoints:
     def test_one_that_carries_the_tool_is_refused_with_the_mend(self, make_joint, write_robot):
         follower = make_joint(limit=CENTRED + '<mimic joint="joint_1" multiplier="2"/>')
         path = write_robot([make_joint(), follower])
-        with pytest.raises(ArmError, match="mimics 'joint_1' and carries the tool: hold"):
+        with pytest.raises(ArmError, match=r"mimics 'joint_1' and.* tool: hold it \(held\)$"):
             Arm.load(path)
         arm = Arm.load(path, held={"joint_2": 0.2})
         assert arm.joint_names == ("joint_1",)
+
+    def test_a_finger_that_became_the_tool_suggests_a_frame(self, make_joint, write_robot):
+        path = write_robot([make_joint(), make_joint(axis="0 1 0")], extra=gripper())
+        with pytest.raises(ArmError, match=r"'open_b'.* before it: --tool-frame tool0$"):
+            Arm.load(path, tool_frame="finger_b")
+        assert Arm.load(path, tool_frame="tool0").joint_names == ("joint_1", "joint_2")
 
     def test_one_that_follows_a_joint_of_the_chain_is_refused(self, make_joint, write_robot):
         path = write_robot([make_joint()], extra=gripper(leader="joint_1"))
@@ -252,6 +258,15 @@ class TestRefusals:
         with pytest.raises(ArmError, match=f"made.urdf: joint 'joint_1'.*{words}"):
             Arm.load(path)
         assert capfd.readouterr() == ("", "")
+
+    def test_xacro_is_told_to_be_expanded(self, tmp_path):
+        path = tmp_path / "arm.urdf.xacro"
+        path.write_text(
+            '<robot xmlns:xacro="http://www.ros.org/wiki/xacro" name="arm">'
+            '<xacro:property name="pi" value="3.14"/><link name="base"/></robot>'
+        )
+        with pytest.raises(ArmError, match=r"a xacro file.*: xacro arm.urdf.xacro > arm.urdf$"):
+            Arm.load(path)
 
     def test_no_moving_joint(self, make_joint, write_robot):
         with pytest.raises(ArmError, match="no moving joint"):
