@@ -3,7 +3,7 @@
 import inspect
 import re
 import sys
-from contextlib import suppress
+from collections.abc import Iterable
 from importlib import import_module
 from pathlib import Path
 from typing import Any
@@ -12,8 +12,8 @@ from kinarm._files import first_line
 from kinarm.errors import InvalidInputError, UnknownNameError
 from kinarm.evaluation.contestants import UNTRAINED, Contestant, Predictor
 from kinarm.evaluation.predictors import Actor, Wrapper
-from kinarm.policies.conversion.models import RecurrentModelError
-from kinarm.policies.conversion.sb3 import native_model
+from kinarm.policies.conversion.models import saved_model
+from kinarm.policies.conversion.sb3 import native_statistics
 from kinarm.policies.library import models_in, policy_files
 from kinarm.policies.policy import Policy
 from kinarm.policies.provenance import normalization_remark
@@ -91,6 +91,15 @@ def _find(
     )
 
 
+def check_normalizing(contestants: Iterable[Contestant], vec_normalize: str | Path | None) -> None:
+    """Refuse statistics for models if no contestant is a model of Stable-Baselines3."""
+    models = (each for each in contestants if each.source and each.source.suffix == ".zip")
+    if vec_normalize is not None and not any(models):
+        raise InvalidInputError(
+            "--vec-normalize is for models of Stable-Baselines3 (.zip), and none is named"
+        )
+
+
 def contestant_of(
     policy: str | Path | Policy | Contestant | PolicyFunction | Predictor,
     problem: ProblemLike | None,
@@ -116,11 +125,11 @@ def _model_contestant(
 ) -> Contestant:
     """A model of Stable-Baselines3: converted, or as it is if it needs more."""
     try:
-        if not wrapped:
-            with suppress(RecurrentModelError):
-                policy = Policy.from_sb3(path, problem, vec_normalize)
-                return Contestant.from_policy(path.stem, policy, path.resolve())
-        model, statistics, origin = native_model(path, problem, vec_normalize, wrapped=wrapped)
+        model = saved_model(path)
+        if not wrapped and not model.remembers:
+            policy = Policy.from_sb3(model, problem, vec_normalize)
+            return Contestant.from_policy(path.stem, policy, path.resolve())
+        statistics, origin = native_statistics(model, problem, vec_normalize, wrapped=wrapped)
     except InvalidInputError as error:
         raise InvalidInputError(f"{str(path)!r}: {error}") from error
     return Contestant.from_actor(

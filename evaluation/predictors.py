@@ -6,16 +6,16 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
-import gymnasium
 import numpy as np
 from gymnasium.spaces import Box
 from numpy.typing import ArrayLike, NDArray
 
 from kinarm.envs import ReachEnv
-from kinarm.episodes import Rollouts
+from kinarm.episodes import RUNNING, Episodes, Rollouts, StepResult
 from kinarm.evaluation.trials import TrialSet
 from kinarm.kernels.compiling import Array
 from kinarm.policies.policy import Policy
+from kinarm.simulator import Simulator, takes_rows
 
 Wrapper = Callable[[Any], Any]
 """Wraps an environment: one of Gymnasium, or ``venv``, a ``VecEnv`` of Stable-Baselines3."""
@@ -61,7 +61,11 @@ class Actor:
         return self(observations, None, np.ones(len(observations), bool))[0]
 
     def __call__(
-        self, observations: Any, memory: Memory, episode_start: NDArray[np.bool_]
+        self,
+        observations: Any,
+        memory: Memory,
+        episode_start: NDArray[np.bool_],
+        rows: NDArray[np.int64] | None = None,
     ) -> tuple[ArrayLike, Memory]:
         """Choose actions, shape (n, n_actions), and what to remember.
 
@@ -71,6 +75,8 @@ class Actor:
             Of n episodes.
         memory, episode_start : object, ndarray of bool, shape (n,)
             What was remembered, and which episodes begin.
+        rows : ndarray of int, shape (n,), optional
+            Numbers of the episodes, for functions that ask.
         """
         space = getattr(self.policy, "observation_space", None)
         if isinstance(space, Box):
@@ -78,7 +84,8 @@ class Actor:
         if self.statistics is not None:
             observations = self.statistics.normalize_obs(observations)
         if not hasattr(self.policy, "predict"):
-            return self.policy(observations), None
+            numbered = {"rows": rows} if takes_rows(self.policy) else {}
+            return self.policy(observations, **numbered), None
         given = {"state": memory, "episode_start": episode_start, "deterministic": True}
         answer = self.policy.predict(observations, **{name: given[name] for name in self._options})
         return answer if isinstance(answer, tuple) else (answer, None)
@@ -111,35 +118,42 @@ def run_wrapped(
     return simulator.rollout_actions(actions, trials.starts, trials.goals, record=record)
 
 
-class Arrived(gymnasium.Wrapper[Any, Any, Any, Any]):
-    """Keeps the actions that arrive at the arm, in rows of ``kept``."""
+class Recorder(Simulator):
+    """Steps arms, and keeps the actions that arrive in the first episode of each.
 
-    kept: Array
-    count: int
+    Attributes
+    ----------
+    kept : ndarray, shape (n, horizon, n_actions)
+        The actions, filled in.
+    over : ndarray of bool, shape (n,)
+        Whether nothing is kept any more.
+    """
 
-    def reset(self, **settings: Any) -> tuple[Any, dict[str, Any]]:
-        """Begin an episode."""
-        self.count = 0
-        return self.env.reset(**settings)
+    def keep_in(self, kept: Array) -> None:
+        """Fill these in by the next episodes."""
+        self.kept, self.over = kept, np.zeros(len(kept), dtype=bool)
 
-    def step(self, action: Any) -> tuple[Any, Any, bool, bool, dict[str, Any]]:
-        """Keep an action, and pass it on."""
-        if self.count < len(self.kept):
-            self.kept[self.count] = action
-        self.count += 1
-        return self.env.step(action)
+    def step(self, episodes: Episodes, actions: ArrayLike) -> StepResult:
+        """Advance, and keep the actions of episodes that run."""
+        running = (episodes.status == RUNNING) & ~self.over
+        steps = episodes.steps[running]
+        result = super().step(episodes, actions)
+        self.kept[running, steps] = np.asarray(actions)[running]
+        self.over |= result.terminated | result.truncated
+        return result
 
 
 def _one_by_one(actor: Actor, wrapper: Wrapper, trials: TrialSet, actions: Array) -> None:
     """Run trials in a wrapped environment of Gymnasium; fill in the actions."""
-    arrived = Arrived(ReachEnv(trials.problem))
-    env = wrapper(arrived)
+    arm = ReachEnv(trials.problem)
+    arm.simulator = recorder = Recorder(trials.problem, threads=1)
+    env = wrapper(arm)
     for trial, (start, goal) in enumerate(zip(trials.starts, trials.goals, strict=True)):
-        arrived.kept = actions[trial]
+        recorder.keep_in(actions[trial : trial + 1])
         observation, _ = env.reset(seed=trial, options={"start": start, "goal": goal})
-        memory, first, over = None, np.ones(1, dtype=bool), False
+        memory, first, over, rows = None, np.ones(1, dtype=bool), False, np.array([trial])
         while not over:
-            chosen, memory = actor(_batch(observation), memory, first)
+            chosen, memory = actor(_batch(observation), memory, first, rows)
             observation, _, terminated, truncated, _ = env.step(np.asarray(chosen)[0])
             over, first = terminated or truncated, np.zeros(1, dtype=bool)
     env.close()
@@ -153,35 +167,21 @@ def _batch(observation: Any) -> Any:
 
 def _in_batch(actor: Actor, wrapper: Wrapper, trials: TrialSet, actions: Array) -> None:
     """Run trials in a wrapped ``VecEnv`` of Stable-Baselines3; fill in the actions."""
-    from stable_baselines3.common.vec_env import VecEnvWrapper, unwrap_vec_normalize
+    from stable_baselines3.common.vec_env import unwrap_vec_normalize
 
     from kinarm.policies import sb3_vec_env
 
-    steps = iter(range(actions.shape[1]))
-    over = np.zeros(len(trials), dtype=bool)
-
-    class ArrivedBatch(VecEnvWrapper):
-        """Keeps the actions that arrive at arms whose trials are not over."""
-
-        def reset(self) -> Any:
-            return self.venv.reset()
-
-        def step_async(self, given: NDArray[Any]) -> None:
-            actions[~over, next(steps)] = given[~over]
-            self.venv.step_async(given)
-
-        def step_wait(self) -> Any:
-            return self.venv.step_wait()
-
     arms = sb3_vec_env(trials.problem, len(trials), seed=0)
+    arms.simulator = recorder = Recorder(trials.problem)
+    recorder.keep_in(actions)
     pairs = zip(trials.starts, trials.goals, strict=True)
     arms.set_options([{"start": start, "goal": goal} for start, goal in pairs])
-    venv = wrapper(ArrivedBatch(arms))
+    venv = wrapper(arms)
     if (own := unwrap_vec_normalize(venv)) is not None:
         own.training, actor = False, replace(actor, statistics=None)
     observations, memory, start = venv.reset(), None, np.ones(len(trials), dtype=bool)
-    while not over.all():
-        chosen, memory = actor(observations, memory, start)
+    while not recorder.over.all():
+        chosen, memory = actor(observations, memory, start, np.arange(len(trials)))
         observations, _, start, _ = venv.step(np.asarray(chosen))
-        over |= start
+        recorder.over |= start
     venv.close()

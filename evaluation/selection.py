@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 from kinarm.errors import InvalidInputError
 from kinarm.evaluation.contestants import BASELINES, ORACLE, Contestant
-from kinarm.evaluation.finding import find_contestants
+from kinarm.evaluation.finding import check_normalizing, find_contestants
 from kinarm.policies.library import BEST, group_of, is_shipped, policy_names
 from kinarm.problem import PROBLEMS, ReachProblem
 
@@ -29,6 +29,7 @@ def select_pairs(request: "EvaluationRequest") -> list[Pair]:
     """Decide who faces which problem; the oracle joins on every one."""
     named = _named_problems(request)
     chosen = _named_contestants(request, named) if request.policies else _shipped(request, named)
+    check_normalizing(chosen, request.vec_normalize)
     changed = partial(_changed, request)
     pairs = []
     for problem, contestant in product(named or _problems(request, chosen), chosen):

@@ -28,6 +28,14 @@ PolicyFunction = Callable[..., ArrayLike]
 """Observations, shape (n, n_observations), to actions, shape (n, n_actuated)."""
 
 
+def takes_rows(policy: Callable[..., Any]) -> bool:
+    """Whether a function of observations also asks for the numbers of their episodes."""
+    try:
+        return "rows" in inspect.signature(policy).parameters
+    except (TypeError, ValueError):  # of functions without a signature
+        return False
+
+
 class Simulator:
     """Steps batches of rate-limited joint kinematics with contact checks.
 
@@ -319,12 +327,10 @@ class Simulator:
 
     def _follow(self, policy: PolicyFunction, episodes: Episodes) -> None:
         """Drive episodes to their end with a Python function."""
-        wants_rows = False
-        with suppress(TypeError, ValueError):  # of functions without a signature
-            wants_rows = "rows" in inspect.signature(policy).parameters
+        numbered = takes_rows(policy)
         actions = np.zeros((len(episodes.status), self.n_actions))
         while (rows := np.flatnonzero(episodes.status == RUNNING)).size:
             seen = episodes.observation[rows]
-            chosen = policy(seen, rows) if wants_rows else policy(seen)
+            chosen = policy(seen, rows=rows) if numbered else policy(seen)
             actions[rows] = finite_array("actions", chosen, (len(rows), self.n_actions))
             self._step(episodes, actions)

@@ -11,7 +11,7 @@ from kinarm.errors import InvalidInputError, UnknownNameError
 from kinarm.evaluation.bounds import oracle_bounds
 from kinarm.evaluation.contestants import ORACLE, UNTRAINED, Contestant
 from kinarm.evaluation.document import EvaluationDocument, Result
-from kinarm.evaluation.finding import find_contestants, is_import_path
+from kinarm.evaluation.finding import check_normalizing, find_contestants, is_import_path
 from kinarm.evaluation.outcomes import failure_causes
 from kinarm.evaluation.replay.runs import record
 from kinarm.evaluation.trials import TrialSet
@@ -161,6 +161,7 @@ def named_contestants(
     named = request.problem is not None or request.task is not None
     stated = request.resolve() if named or BEST in names else None
     contestants = [_first_contestant(name, stated, request) for name in names]
+    check_normalizing(contestants, request.vec_normalize)
     if stated is not None:
         return contestants, stated
     trained = [contestant.problem for contestant in contestants if contestant.problem is not None]
@@ -195,6 +196,7 @@ def _evaluated_candidates(
         row = document.result(_name_in(document, contestant) if contestant else name, problem)
         problem = row.problem
         chosen.append((row, contestant or _known_contestant(row.policy, path)))
+    check_normalizing((contestant for _, contestant in chosen), request.vec_normalize)
     count = min(len(row.outcomes.steps) for row, _ in chosen)
     trials = document.trials(str(problem)).first(count)
     runs = []

@@ -149,6 +149,8 @@ class ReplayRequest(ProblemOptions):
         self._refuse("trials from a file", NOT_FROM_FILE if self.source else ())
         if self.source is not None and self.source.suffix == ".json":
             self._refuse("trials of an evaluation", ("arm",))
+        elif self.source is not None:
+            self._refuse("a file of recordings", ("vec_normalize", "wrapper"))
 
     def _refuse(self, mode: str, names: Sequence[str]) -> None:
         for option in self._given(names):

@@ -14,12 +14,18 @@ FAMILIES = ("TQCPolicy", "SACPolicy", "TD3Policy", "ActorCriticPolicy")
 
 
 class SB3Model(NamedTuple):
-    """What a conversion needs of a model; ``env`` is None if it is unknown."""
+    """What a conversion needs of a model; ``env`` and ``file`` are None if unknown."""
 
     policy: Any
     algorithm: str
     attributes: Mapping[str, Any]
     env: Any
+    file: Path | None = None
+
+    @property
+    def remembers(self) -> bool:
+        """Whether it is recurrent: it remembers earlier observations."""
+        return any("Recurrent" in base.__name__ for base in type(self.policy).__mro__)
 
     @property
     def problem(self) -> ReachProblem | None:
@@ -33,6 +39,8 @@ class SB3Model(NamedTuple):
 
 def sb3_model(given: Any) -> SB3Model:
     """Take what a conversion needs from a model or its file."""
+    if isinstance(given, SB3Model):
+        return given
     if isinstance(given, str | Path):
         return saved_model(Path(given))
     if not hasattr(given, "policy") or not hasattr(given, "num_timesteps"):
@@ -43,7 +51,7 @@ def sb3_model(given: Any) -> SB3Model:
     return SB3Model(given.policy, type(given).__name__.lower(), vars(given), given.get_env())
 
 
-def saved_model(path: Path, *, any_kind: bool = False) -> SB3Model:
+def saved_model(path: Path) -> SB3Model:
     """Build the networks of a file, without the buffers of a training."""
     try:
         from stable_baselines3.common.save_util import load_from_zip_file
@@ -62,7 +70,7 @@ def saved_model(path: Path, *, any_kind: bool = False) -> SB3Model:
     if not data or not isinstance(data.get("policy_class"), type):
         raise PolicyFileError(f"{name} holds no policy that Stable-Baselines3 can build here")
     kind = data["policy_class"]
-    family = "ActorCriticPolicy" if any_kind and is_recurrent(kind) else _family(kind)
+    family = _family(kind)
     with reading(**told):
         options = {key: each for key, each in data["policy_kwargs"].items() if key != "device"}
         if family == "ActorCriticPolicy":
@@ -70,25 +78,12 @@ def saved_model(path: Path, *, any_kind: bool = False) -> SB3Model:
         spaces = (data["observation_space"], data["action_space"])
         policy = kind(*spaces, lambda _: 0.0, **options)
         policy.load_state_dict(parameters["policy"])
-    return SB3Model(policy, _algorithm_of(family, data), data, None)
-
-
-class RecurrentModelError(InvalidInputError):
-    """A model remembers, which kinarm's policies do not."""
-
-
-def is_recurrent(kind: type) -> bool:
-    """Whether policies of a class remember earlier observations."""
-    return any("Recurrent" in base.__name__ for base in kind.__mro__)
+    return SB3Model(policy, _algorithm_of(family, data), data, None, path)
 
 
 def _family(kind: type) -> str:
-    """The base class of a policy that can be converted."""
+    """The base class of a policy that can be converted, or is recurrent."""
     names = [base.__name__ for base in kind.__mro__]
-    if is_recurrent(kind):
-        raise RecurrentModelError(
-            f"the model is recurrent ({kind.__name__}): kinarm's policies see one observation"
-        )
     for family in FAMILIES:
         if family in names:
             return family

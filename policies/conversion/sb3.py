@@ -22,7 +22,7 @@ from kinarm.policies.conversion.layers import (
     normalization,
     policy_of_pieces,
 )
-from kinarm.policies.conversion.models import SB3Model, saved_model, sb3_model
+from kinarm.policies.conversion.models import SB3Model, sb3_model
 from kinarm.policies.conversion.statistics import (
     NONE,
     check_not_normalized,
@@ -56,7 +56,7 @@ def policy_from_sb3(
     ----------
     kind : type
         `Policy`.
-    given : BaseAlgorithm, str or Path
+    given : BaseAlgorithm, SB3Model, str or Path
         The model, or its file.
     problem, vec_normalize
         The problem of the policy, and the ``VecNormalize`` of its observations,
@@ -68,12 +68,17 @@ def policy_from_sb3(
         If it cannot be converted, or a file cannot be read.
     """
     model = sb3_model(given)
+    if model.remembers:
+        raise InvalidInputError(
+            f"the model is recurrent ({type(model.policy).__name__}): kinarm's policies see one "
+            "observation"
+        )
     own = ReachProblem.load(problem) if problem is not None else model.problem
     if own is None:
         raise InvalidInputError(NO_PROBLEM)
     simulator = Simulator(own, threads=1)
     interface, selection, sizes = model_inputs(model.policy, simulator)
-    statistics, origin = _statistics_of(model, given, vec_normalize, simulator.arm.n_joints)
+    statistics, origin = _statistics_of(model, vec_normalize, simulator.arm.n_joints)
     model.policy.set_training_mode(False)
     config = {
         key: value
@@ -98,27 +103,24 @@ def policy_from_sb3(
     return policy
 
 
-def _statistics_of(
-    model: SB3Model, given: Any, asked: Any, n_joints: int | None
-) -> tuple[Any, str | None]:
+def _statistics_of(model: SB3Model, asked: Any, n_joints: int | None) -> tuple[Any, str | None]:
     """The ``VecNormalize`` of a model's observations, or None, and where it is from to tell."""
     from stable_baselines3.common.vec_env import unwrap_vec_normalize
 
     if str(asked) == NONE:
         return None, NONE
-    file = Path(given) if isinstance(given, str | Path) else None
-    if asked is None and file is not None:
-        asked = find_vec_normalize(file)
+    if asked is None and model.file is not None:
+        asked = find_vec_normalize(model.file)
     if asked is not None:
         is_file = isinstance(asked, str | Path)
         return load_vec_normalize(asked), str(asked) if is_file else "VecNormalize"
     statistics = unwrap_vec_normalize(model.env)
     if statistics is not None:
         return statistics, "VecNormalize of its environment"
-    if file is None:
+    if model.file is None:
         return None, None
     if n_joints is not None:
-        check_not_normalized(model.attributes.get("_last_obs"), n_joints, file)
+        check_not_normalized(model.attributes.get("_last_obs"), n_joints, model.file)
     return None, NONE
 
 
@@ -155,14 +157,14 @@ def _check_same_actions(
         )
 
 
-def native_model(
-    path: Path, problem: ProblemLike | None, vec_normalize: Any, *, wrapped: bool
-) -> tuple[SB3Model, Any, str | None]:
-    """Load a model to use as it is, since it remembers or sees a wrapper's observations.
+def native_statistics(
+    model: SB3Model, problem: ProblemLike | None, vec_normalize: Any, *, wrapped: bool
+) -> tuple[Any, str | None]:
+    """Find the statistics of a model that is used as it is: in a wrapper, or with a memory.
 
     Parameters
     ----------
-    path, problem, vec_normalize
+    model, problem, vec_normalize
         As for `Policy.from_sb3`.
     wrapped : bool
         Whether it sees a wrapper's observations, which are not checked.
@@ -170,18 +172,17 @@ def native_model(
     Returns
     -------
     tuple
-        The model; the ``VecNormalize`` of its observations or None; and where
-        that is from.
+        The ``VecNormalize`` of its observations or None, and where that is
+        from.
     """
     if problem is None:
         raise InvalidInputError(NO_PROBLEM)
-    model = saved_model(path, any_kind=True)
     simulator = Simulator(problem, threads=1)
     if not wrapped:
         _check_actions(model.policy.action_space, simulator)
         _check_observations(model.policy.observation_space, Interface(simulator), simulator)
     n_joints = None if wrapped else simulator.arm.n_joints
-    return model, *_statistics_of(model, path, vec_normalize, n_joints)
+    return _statistics_of(model, vec_normalize, n_joints)
 
 
 def model_inputs(policy: Any, simulator: Simulator) -> tuple[Interface, Layer, dict[str, int]]:

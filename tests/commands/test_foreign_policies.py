@@ -68,6 +68,12 @@ class TestModel:
         for name, word in (("broken.zip", "not a complete"), ("gone.zip", "No such file")):
             check_refused(run(command, "--policy", name, "--problem", "right"), name, word)
 
+    @pytest.mark.parametrize("command", ["kinarm-eval", "kinarm-replay"])
+    @pytest.mark.parametrize("policy", ["ars-tuned-both-seed0", "random"])
+    def test_statistics_without_a_model(self, run, here, command, policy):
+        words = (command, "--policy", policy, "--problem", "both", "--vec-normalize", "none")
+        check_refused(run(*words), "--vec-normalize", "models of Stable-Baselines3")
+
 
 class TestModule:
     @pytest.mark.parametrize("command", ["kinarm-eval", "kinarm-replay"])

@@ -5,9 +5,11 @@ import numpy as np
 import pytest
 
 from kinarm.envs import ReachEnv
+from kinarm.episodes import SUCCESS
 from kinarm.errors import InvalidInputError
 from kinarm.evaluation import TrialSet, evaluate, find_contestants
 from kinarm.policies import load_policy
+from kinarm.problem import PROBLEMS
 
 TRIALS, SEED = 12, 3
 
@@ -68,6 +70,18 @@ class TestMemory:
         for policy in (recurrent, found):
             assert ends_of(evaluate(policy, "right", TRIALS, SEED)) == expected
 
+    def test_its_file_is_read_once(self, recurrent, tmp_path, monkeypatch):
+        save_util = pytest.importorskip("stable_baselines3.common.save_util")
+        recurrent.save(tmp_path / "model.zip")
+        load, read = save_util.load_from_zip_file, []
+        monkeypatch.setattr(
+            save_util,
+            "load_from_zip_file",
+            lambda path, **how: (read.append(path), load(path, **how))[1],
+        )
+        find_contestants(tmp_path / "model.zip", "right")
+        assert read == [tmp_path / "model.zip"]
+
     def test_matters(self, recurrent, trials):
         """Without memory, the same networks end elsewhere."""
 
@@ -107,6 +121,18 @@ class TestStatistics:
         assert "observations normalised by VecNormalize" in evaluation.contestant.note
 
 
+class Numbered:
+    """Acts as drawn for each trial and step, as its rows tell."""
+
+    def __init__(self):
+        self.drawn = np.random.default_rng(0).uniform(-1, 1, (TRIALS, 65, 5))
+        self.steps = np.zeros(TRIALS, dtype=int)
+
+    def __call__(self, observations, *, rows):
+        self.steps[rows] += 1
+        return self.drawn[rows, self.steps[rows] - 1]
+
+
 def scenarios(trials):
     return trials.starts, trials.goals
 
@@ -138,7 +164,50 @@ class Clumsy(gymnasium.Wrapper):
         return np.concatenate([observation, action]), *rest
 
 
+def twice(venv):
+    """Repeats actions, as wrappers that skip frames do; the end may come between."""
+    from stable_baselines3.common.vec_env import VecEnvWrapper
+
+    class Twice(VecEnvWrapper):
+        def reset(self):
+            return self.venv.reset()
+
+        def step_wait(self):
+            self.venv.step_wait()
+            self.venv.step_async(self.venv._actions)
+            return self.venv.step_wait()
+
+    return Twice(venv)
+
+
 class TestWrapper:
+    @pytest.mark.parametrize("kind", ["gymnasium", "sb3"])
+    def test_functions_may_ask_which_episode_is_which(self, kind):
+        pytest.importorskip("stable_baselines3")
+        wrapper = (lambda env: env) if kind == "gymnasium" else (lambda venv: venv)
+        expected = ends_of(evaluate(Numbered(), "right", TRIALS, SEED))
+        assert ends_of(evaluate(Numbered(), "right", TRIALS, SEED, wrapper=wrapper)) == expected
+
+    def test_actions_repeated_beyond_the_horizon(self):
+        """An odd horizon ends between the two; what the next episode does is not kept."""
+        pytest.importorskip("stable_baselines3")
+        problem = PROBLEMS["right"].replace(horizon=5)
+
+        def away(observations):
+            return np.tanh(observations[:, 3:8])
+
+        evaluation = evaluate(away, problem, TRIALS, SEED, wrapper=twice)
+        simulator = evaluation.trials.simulator
+        episodes = simulator.reset(*scenarios(evaluation.trials))
+        for step in range(5):
+            if step % 2 == 0:
+                actions = away(episodes.observation)
+            simulator.step(episodes, actions)
+        found = evaluation.rollouts
+        np.testing.assert_array_equal(found.steps, episodes.steps)
+        np.testing.assert_array_equal(found.success, episodes.status == SUCCESS)
+        np.testing.assert_allclose(found.distance, episodes.distance, rtol=0, atol=1e-6)
+
     def test_of_stable_baselines3(self, trials, tmp_path):
         sb3 = pytest.importorskip("stable_baselines3")
         model = louder(sb3.PPO("MlpPolicy", stacked(arms(trials)), seed=2, device="cpu"))
