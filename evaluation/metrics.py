@@ -9,6 +9,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from kinarm._tables import ALWAYS
 from kinarm.evaluation.outcomes import EARLY_STEPS, HOLDING_STEPS, Outcomes
 
 FINAL = "final distance over all trials, however they ended"
@@ -23,9 +24,6 @@ CLOSE = (0.02, 0.01, 0.005)
 
 HOLDING_WITHIN = 0.01
 """Distance within which the tool stays to the end if a goal is held [m]."""
-
-ALWAYS = float("inf")
-"""Priority of columns that are never left out."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -144,7 +142,7 @@ METRICS: dict[str, Metric] = {
         needs_bounds=True,
         heading="relative success %",
         digits=1,
-        priority=7,
+        priority=11,
     ),
     **{
         f"within_{limit:g}": _share_of(
@@ -162,7 +160,7 @@ METRICS: dict[str, Metric] = {
         formula=lambda trials: _median(trials.ordered_distance),
         heading="median distance m",
         shows_interval=True,
-        priority=12,
+        priority=10,
     ),
     "mean_distance": _distance(
         meaning=f"mean of the {FINAL}",
@@ -194,7 +192,7 @@ METRICS: dict[str, Metric] = {
         "|C| / n",
         lambda trials: trials.collision,
         heading="collision %",
-        priority=6,
+        priority=14.5,
     ),
     "early_collision": _share_of(
         f"that ended in contact within the first {EARLY_STEPS} steps",

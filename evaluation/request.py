@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, ClassVar
 
 from kinarm._files import absolute, check_output, only_writer, write_text
+from kinarm._tables import TableOptions
 from kinarm.errors import FROM_ZERO, TRIALS, InvalidInputError
 from kinarm.problem import problem_names
 from kinarm.problem_options import ProblemOptions, say_choices
@@ -33,7 +34,7 @@ def policy_choices() -> tuple[str, ...]:
 
 
 @dataclass(frozen=True, kw_only=True)
-class EvaluationRequest(ProblemOptions):
+class EvaluationRequest(ProblemOptions, TableOptions):
     """Evaluate policies on random reaching trials, beside an oracle.
 
     By default a trained policy faces the problem that it was trained for,
@@ -78,8 +79,6 @@ class EvaluationRequest(ProblemOptions):
     card : Path
         Card of the one policy that is named (.md), with the policy (.npz) and a
         replay (.html).
-    overwrite : bool
-        Replace earlier results.
     json : bool
         Print the JSON document alone on standard output.
     markdown : bool
@@ -110,7 +109,6 @@ class EvaluationRequest(ProblemOptions):
     out: Path | None = field(default=None, metadata={"metavar": "FOLDER"})
     report: Path | None = field(default=None, metadata={"metavar": "FOLDER"})
     card: Path | None = None
-    overwrite: bool = False
     json: bool = False
     markdown: bool = False
 
@@ -124,19 +122,22 @@ class EvaluationRequest(ProblemOptions):
             "allow_other_arm",
         ),
         "trials": ("trials", "seed", "oracle", "hold"),
-        "output": ("out", "report", "card", "overwrite", "json", "markdown"),
+        "table": ("columns", "csv", "markdown", "json"),
+        "output": ("out", "report", "card", "overwrite"),
         "changes to the problems": ProblemOptions.GROUPS["problem"][1:],
     }
     DEFAULTS: ClassVar = {
         **ProblemOptions.DEFAULTS,
         "policies": "all shipped policies, random and zero",
         "problems": "what each policy was trained for",
+        "columns": "all that fit",
     }
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if self.json and self.markdown:
-            raise InvalidInputError("--json and --markdown exclude each other")
+        alone = (("--json", self.json), ("--markdown", self.markdown), ("--csv -", self.prints_csv))
+        if len(given := [option for option, is_given in alone if is_given]) > 1:
+            raise InvalidInputError(f"{given[0]} and {given[1]} exclude each other")
 
     def run(self, command: str | None = None, tell: Tell = lambda _: None) -> "EvaluationDocument":
         """Evaluate, and write the outputs.
@@ -205,6 +206,10 @@ class EvaluationRequest(ProblemOptions):
 
             tell("writing the card")
             write_card(self.card, document, evaluations)
+        if self.csv is not None:
+            from kinarm.evaluation.table import all_columns, every_row
+
+            self.write_csv(all_columns(), every_row(document))
         if self.out is not None:
             from kinarm.evaluation.figures import distance_histograms, save_figure
             from kinarm.evaluation.schemas import document_text
@@ -217,6 +222,10 @@ class EvaluationRequest(ProblemOptions):
         """Who faces which problem, after checks of policies and files."""
         from kinarm.evaluation.selection import select_pairs
 
+        if self.columns or self.csv:
+            from kinarm.evaluation.table import all_columns
+
+            self.check_table(all_columns())
         pairs = select_pairs(self)
         problems = {problem.name: problem for _, problem in pairs}
         arms = {name: problem.load_arm() for name, problem in problems.items()}

@@ -1,21 +1,21 @@
-"""The table of an evaluation, for terminals, Markdown and reports."""
+"""The table of an evaluation, for terminals, Markdown, CSV and reports."""
 
-import io
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
-from functools import partial
-from typing import TYPE_CHECKING, Literal, NamedTuple
+from collections.abc import Callable, Mapping, Sequence
+from operator import attrgetter
+from typing import TYPE_CHECKING, NamedTuple, TypeVar
 
-from kinarm._console import open_console, print_fitting
+from kinarm._tables import ALWAYS, CHOOSE, Column, print_columns, print_markdown
 from kinarm.evaluation.document import EvaluationDocument, PooledResult, Row
-from kinarm.evaluation.metrics import ALWAYS, METRICS
+from kinarm.evaluation.metrics import METRICS
+from kinarm.evaluation.statistics import Estimate
 
 if TYPE_CHECKING:
     from rich.console import Console
-    from rich.table import Table
 
-SPREAD_PRIORITY = 5
-"""`Metric.priority` of columns with ranges over training seeds."""
+T = TypeVar("T")
+
+SEEDS_PRIORITY, SPREAD_PRIORITY, ON_REQUEST = 16, 5, -1
+"""`Metric.priority` of the number of seeds, of ranges over them, and of what ``--columns`` adds."""
 
 REPLACED = "* some settings of the recipe are replaced"
 """Meaning of the star in a label."""
@@ -31,56 +31,80 @@ class Cell(NamedTuple):
         return f"{self.value} ({self.beside})" if self.beside else self.value
 
 
-@dataclass(frozen=True)
-class Column:
-    """A column of the table, with the cell of each row of the document."""
+def metric_column(name: str, estimates: Callable[[T], Mapping[str, Estimate]]) -> Column[T]:
+    """The column of a metric, of rows that have estimates by metric."""
+    metric = METRICS[name]
 
-    heading: str
-    meaning: str
-    priority: float
-    cell: Callable[[Row], Cell]
+    def cell(row: T) -> Cell:
+        known = estimates(row)
+        value, ci95 = known[name].value, known[name].ci95
+        if value is None:
+            return Cell()
+        beside = metric.write_range(*ci95) if metric.shows_interval and ci95 else ""
+        if metric.beside and metric.beside[0] in known:
+            other, words = metric.beside
+            beside = words.format(METRICS[other].write(known[other].value or 0.0))
+        return Cell(metric.write(value), beside)
+
+    def values(row: T) -> dict[str, float | None]:
+        estimate = estimates(row)[name]
+        ends = zip((f"{name}_low", f"{name}_high"), estimate.ci95 or (), strict=False)
+        return {name: estimate.value, **dict(ends)}
+
+    heading = metric.heading or f"{name.replace('_', ' ')} {metric.unit}".rstrip()
+    priority = metric.priority if metric.heading else ON_REQUEST
+    return Column(heading, cell, name, metric.meaning, priority, values)
 
 
-def metric_columns() -> list[Column]:
-    """Columns of the `METRICS` that have a heading."""
-    columns = []
+def spread_column(name: str) -> Column[Row]:
+    """The column of a metric's range over training seeds; empty without seeds."""
+    metric = METRICS[name]
+
+    def values(row: Row) -> dict[str, float]:
+        if not isinstance(row, PooledResult) or name not in row.spread:
+            return {}
+        return {f"{name}_min": row.spread[name].min, f"{name}_max": row.spread[name].max}
+
+    def cell(row: Row) -> Cell:
+        ends = values(row).values()
+        return Cell(metric.write_range(*ends)) if ends else Cell()
+
+    meaning = f"range over training seeds: {metric.meaning}"
+    return Column(metric.spread_heading, cell, f"{name}_range", meaning, SPREAD_PRIORITY, values)
+
+
+def all_columns() -> list[Column[Row]]:
+    """Every column that there can be: labels, the number of seeds, and the `METRICS`."""
+    columns: list[Column[Row]] = [
+        Column("problem", attrgetter("problem"), priority=ALWAYS, words=True),
+        Column("policy", policy_label, priority=ALWAYS, words=True),
+        *(
+            Column(name, lambda row, name=name: getattr(row, name) or "", priority=ON_REQUEST)
+            for name in ("algorithm", "recipe", "trained_on", "trials")
+        ),
+        Column(
+            "seeds",
+            lambda row: Cell(str(len(row.members)) if isinstance(row, PooledResult) else ""),
+            meaning="trainings of a recipe that differ in their seed alone",
+            priority=SEEDS_PRIORITY,
+        ),
+    ]
     for name, metric in METRICS.items():
-        if metric.heading:
-            cell = partial(metric_cell, name)
-            columns.append(Column(metric.heading, metric.meaning, metric.priority, cell))
+        columns.append(metric_column(name, attrgetter("metrics")))
         if metric.spread_heading:
-            meaning = f"range over training seeds, and their number: {metric.meaning}"
-            cell = partial(spread_cell, name)
-            columns.append(Column(metric.spread_heading, meaning, SPREAD_PRIORITY, cell))
+            columns.append(spread_column(name))
     return columns
 
 
-def telling_columns(rows: Sequence[Row], priority: float = 0) -> list[Column]:
+def metric_columns() -> list[Column[Row]]:
+    """Columns of figures that nobody has to ask for."""
+    return [each for each in all_columns() if each.meaning and each.priority > ON_REQUEST]
+
+
+def telling_columns(rows: Sequence[Row], priority: float = 0) -> list[Column[Row]]:
     """Metric columns of some priority that say something about rows."""
     columns = (column for column in metric_columns() if column.priority >= priority)
-    return [column for column in columns if any(column.cell(row).value for row in rows)]
-
-
-def metric_cell(name: str, row: Row) -> Cell:
-    """A metric in a row of the document."""
-    metric, estimate = METRICS[name], row.metrics[name]
-    if estimate.value is None:
-        return Cell()
-    beside = ""
-    if metric.shows_interval and estimate.ci95:
-        beside = metric.write_range(*estimate.ci95)
-    if metric.beside:
-        other, words = metric.beside
-        beside = words.format(METRICS[other].write(row.metrics[other].value or 0.0))
-    return Cell(metric.write(estimate.value), beside)
-
-
-def spread_cell(name: str, row: Row) -> Cell:
-    """A metric's range over training seeds; empty without seeds."""
-    if not isinstance(row, PooledResult) or name not in row.spread:
-        return Cell()
-    spread = row.spread[name]
-    return Cell(METRICS[name].write_range(spread.min, spread.max), f"{len(spread.each)} seeds")
+    return [column for column in columns if any(str(column.cell(row)) for row in rows)]
 
 
 def policy_label(row: Row) -> str:
@@ -98,7 +122,11 @@ def has_star(row: Row) -> bool:
 
 
 def print_table(
-    document: EvaluationDocument, console: "Console", *, markdown: bool = False
+    document: EvaluationDocument,
+    console: "Console",
+    *,
+    markdown: bool = False,
+    columns: Sequence[Column[Row]] = (),
 ) -> None:
     """Print the figures of a document.
 
@@ -109,47 +137,17 @@ def print_table(
     markdown : bool
         As Markdown with all columns; else some are left out where space is
         scarce.
+    columns : sequence of Column
+        Columns to print, all of them, instead of those that say something.
     """
-    rows = [row for problem in document.protocol.problems for row in table_rows(document, problem)]
-    columns = [
-        Column("problem", "", ALWAYS, lambda row: Cell(row.problem)),
-        Column("policy", "", ALWAYS, lambda row: Cell(policy_label(row))),
-        *telling_columns(rows),
-    ]
+    groups = [table_rows(document, problem) for problem in document.protocol.problems]
+    rows = every_row(document)
+    labels = (column for column in all_columns() if column.is_label)
+    shown = columns or [*labels, *telling_columns(rows)]
     if markdown:
-        text = io.StringIO()
-        open_console(file=text).print(_evaluation_table(document, columns, markdown=True))
-        console.out(text.getvalue().strip(), highlight=False)
-        return
-    expendable = sorted((c for c in columns if c.priority < ALWAYS), key=lambda c: c.priority)
-    print_fitting(
-        console,
-        lambda left_out: _evaluation_table(
-            document, [column for column in columns if column.heading not in left_out]
-        ),
-        [column.heading for column in expendable],
-        "--markdown prints all",
-    )
-
-
-def _evaluation_table(
-    document: EvaluationDocument, columns: Sequence[Column], *, markdown: bool = False
-) -> "Table":
-    """The table of a document; several training seeds share a row."""
-    from rich import box
-    from rich.table import Table
-
-    table = Table(box=box.MARKDOWN if markdown else box.HEAVY_HEAD, header_style="bold")
-    for column in columns:
-        side: Literal["left", "right"] = "right" if column.meaning else "left"
-        table.add_column(column.heading, justify=side, no_wrap=True)
-    for problem in document.protocol.problems:
-        if not markdown:
-            table.add_section()
-        for row in table_rows(document, problem):
-            texts = (str(column.cell(row)) for column in columns)
-            table.add_row(*(text.replace("*", "\\*") if markdown else text for text in texts))
-    return table
+        print_markdown(shown, rows, console)
+    else:
+        print_columns(shown, groups, console, whole=bool(columns), advice=CHOOSE)
 
 
 def table_rows(document: EvaluationDocument, problem: str) -> list[Row]:
@@ -159,3 +157,8 @@ def table_rows(document: EvaluationDocument, problem: str) -> list[Row]:
     single = [row for row in document.results if row.problem == problem]
     rows = (*pooled, *(row for row in single if row.policy not in members))
     return sorted(rows, key=lambda row: -(row.metrics["success"].value or 0.0))
+
+
+def every_row(document: EvaluationDocument) -> list[Row]:
+    """The rows of all problems."""
+    return [row for problem in document.protocol.problems for row in table_rows(document, problem)]

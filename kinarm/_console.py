@@ -1,10 +1,10 @@
-"""Terminals of the commands: tables, activities and progress."""
+"""Terminals of the commands: activities and progress."""
 
 import math
 import os
 import sys
 import time
-from collections.abc import Callable, Collection, Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from datetime import timedelta
 from importlib.util import find_spec
@@ -12,10 +12,9 @@ from typing import IO, TYPE_CHECKING
 
 if TYPE_CHECKING:
     from rich.console import Console
-    from rich.table import Table
 
-UNBOUNDED = 1000
-"""Width with room for every table."""
+PIPED, UNBOUNDED = 120, 1000
+"""Widths of piped output, and with room for everything."""
 
 COMPILING = "compiling, once: up to half a minute"
 """Activity while kernels are compiled."""
@@ -60,74 +59,22 @@ def _tell() -> None:
 def open_console(*, stderr: bool = False, file: IO[str] | None = None) -> "Console":
     """A console that prints texts without markup.
 
-    It is as wide as the terminal. Piped standard output, unless ``COLUMNS`` is set in the
-    environment, and files are unbounded.
+    It is as wide as the terminal, or as ``COLUMNS`` of the environment says. Piped standard output
+    without it has `PIPED` characters; files are unbounded.
     """
     from rich.console import Console
 
     piped = not stderr and not sys.stdout.isatty() and "COLUMNS" not in os.environ
+    width = PIPED if piped else None
     return Console(
         stderr=stderr,
         file=file,
-        width=UNBOUNDED if file is not None or piped else None,
+        width=width if file is None else UNBOUNDED,
         markup=False,
         emoji=False,
         highlight=False,
         force_jupyter=None if find_spec("ipywidgets") else False,  # it needs them to redraw
     )
-
-
-def print_fitting(
-    console: "Console",
-    table_without: Callable[[Collection[str]], "Table"],
-    expendable: Sequence[str],
-    advice: str,
-) -> None:
-    """Print a table without columns that have no room, and name these.
-
-    Parameters
-    ----------
-    console, advice
-        Where to print it, and how to see all columns.
-    table_without : callable
-        The table without the columns of given headings.
-    expendable : sequence of str
-        Headings to leave out, in this order.
-    """
-    unbounded = console.options.update(width=UNBOUNDED)
-    for count in range(len(expendable) + 1):
-        left_out = expendable[:count]
-        table = table_without(left_out)
-        if console.measure(table, options=unbounded).maximum <= console.width:
-            break
-    console.print(table)
-    if left_out:
-        note = f"columns that do not fit here: {', '.join(left_out)}; {advice}"
-        console.print(note, style="dim")
-
-
-def print_table(
-    headings: Sequence[str], rows: Sequence[Sequence[str]], expendable: Sequence[str] = ()
-) -> None:
-    """Print a table of texts on standard output.
-
-    Parameters
-    ----------
-    headings, rows
-        Texts of the headings, and of each row.
-    expendable : sequence of str
-        Headings to leave out, in this order, in narrow terminals.
-    """
-    from rich.table import Table
-
-    def table_without(left_out: Collection[str]) -> Table:
-        shown = [k for k, heading in enumerate(headings) if heading not in left_out]
-        table = Table(*(headings[k] for k in shown), box=None, header_style="bold", pad_edge=False)
-        for row in rows:
-            table.add_row(*(row[k] for k in shown))
-        return table
-
-    print_fitting(open_console(), table_without, expendable, "a wider terminal shows them")
 
 
 @contextmanager

@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import cast
 
 from kinarm._command_line import Commands, run_commands
-from kinarm._console import print_table
 from kinarm._files import check_output
+from kinarm._tables import print_table
 from kinarm.arm_specification import PACKAGE, ArmFile, arm_names
 
 HEADINGS = (

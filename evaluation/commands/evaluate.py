@@ -14,40 +14,44 @@ if TYPE_CHECKING:
 
 def _report(request: EvaluationRequest, command: str) -> None:
     """Run a request, and print the table with its notes, or JSON."""
-    from kinarm.evaluation.table import print_table
+    from kinarm.evaluation.table import all_columns, print_table
 
     with working("evaluating") as say:
         document = request.run(command, say)
     if request.json:
         print(json.dumps(document.to_json()))
+    if request.json or request.prints_csv:
         return
     console = open_console()
-    print_table(document, console, markdown=request.markdown)
+    columns = request.chosen(all_columns()) if request.columns else ()
+    print_table(document, console, markdown=request.markdown, columns=columns)
     if not request.markdown:
         console.print(_footnote(document), style="dim")
         if not request.policies and all(row.trained_on is None for row in document.results):
             console.print("no shipped policy was trained for this", style="dim")
+    written = [f"{request.csv}"] if request.csv else []
     if request.out is not None:
-        console.print(f"written: {request.out / DOCUMENT} and histograms", style="dim")
+        written.append(f"{request.out / DOCUMENT} and histograms")
     if request.report is not None:
-        console.print(f"written: {request.report / REPORT}", style="dim")
+        written.append(f"{request.report / REPORT}")
     if request.card is not None:
         beside = f"{request.card.stem}.npz and {request.card.stem}.html"
-        console.print(f"written: {request.card}, {beside}", style="dim")
+        written.append(f"{request.card}, {beside}")
+    for files in written:
+        console.print(f"written: {files}", style="dim", soft_wrap=True)
 
 
 def _footnote(document: "EvaluationDocument") -> str:
     """Notes on the figures in the table."""
     from kinarm.evaluation.report.templating import template_environment
-    from kinarm.evaluation.table import REPLACED, has_star, table_rows
+    from kinarm.evaluation.table import REPLACED, every_row, has_star
 
     protocol = document.protocol
-    rows = (row for name in protocol.problems for row in table_rows(document, name))
     template = template_environment().get_template("footnote.txt")
     text = template.render(
         protocol=protocol,
         results=document.results,
-        starred=any(map(has_star, rows)),
+        starred=any(map(has_star, every_row(document))),
         replaced=REPLACED,
     )
     return text.rstrip()

@@ -7,8 +7,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, BinaryIO, ClassVar, cast
 
 from kinarm._command_line import Commands, run_commands
-from kinarm._console import print_table, working
+from kinarm._console import working
 from kinarm._files import check_output, write_atomically, write_text
+from kinarm._tables import print_table
 from kinarm.errors import FROM_ZERO, TRIALS
 from kinarm.problem import ReachProblem, problem_names
 from kinarm.problem_options import ProblemOptions, say_choices

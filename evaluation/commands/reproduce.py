@@ -7,9 +7,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, ClassVar
 
 from kinarm._command_line import run_request
-from kinarm._console import open_console, print_table
+from kinarm._console import open_console
 from kinarm._interrupts import GOES_ON, telling
 from kinarm._parallel import available_threads
+from kinarm._tables import print_table
 from kinarm.evaluation.commands.study import BOUNDING, RunningOptions
 
 if TYPE_CHECKING:

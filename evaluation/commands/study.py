@@ -7,10 +7,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, ClassVar
 
 from kinarm._command_line import run_request
-from kinarm._console import open_console, print_table
+from kinarm._console import open_console
 from kinarm._fields import Checked
 from kinarm._interrupts import GOES_ON, telling
 from kinarm._parallel import available_threads
+from kinarm._tables import CHOOSE, TableOptions, print_columns
 from kinarm.errors import InvalidInputError, TrainingFailedError
 
 if TYPE_CHECKING:
@@ -84,7 +85,7 @@ class RunningOptions(Checked):
 
 
 @dataclass(frozen=True, kw_only=True)
-class StudyRequest(RunningOptions):
+class StudyRequest(RunningOptions, TableOptions):
     """Run the trainings of an experiment, and write their results.
 
     Parameters
@@ -115,10 +116,12 @@ class StudyRequest(RunningOptions):
 
     GROUPS: ClassVar = {
         "experiment": (*("experiment", "only", "problems", "seeds", "out", "train", "threads"),),
+        "table": ("columns", "csv", "overwrite"),
         **RunningOptions.GROUPS,
     }
     DEFAULTS: ClassVar = {
         **RunningOptions.DEFAULTS,
+        "columns": "all that fit",
         "only": "all",
         "problems": "its own",
         "seeds": "its own",
@@ -152,7 +155,9 @@ class StudyRequest(RunningOptions):
         from kinarm.evaluation.experiments.experiment import Experiment
         from kinarm.evaluation.experiments.page import write_all
         from kinarm.evaluation.experiments.study import Study
+        from kinarm.evaluation.experiments.table import COLUMNS
 
+        self.check_table(COLUMNS)
         experiment = Experiment.load(self.experiment).only(
             entries=self.only, problems=self.problems, seeds=self.seeds
         )
@@ -168,6 +173,7 @@ class StudyRequest(RunningOptions):
             if len(study):
                 with open_console(stderr=True).status(BOUNDING):
                     write_all(study, command or repr(self))
+                    self.write_csv(COLUMNS, study.best(len(study)))
             if failed:
                 raise failed
         return study
@@ -196,15 +202,22 @@ def main(arguments: Sequence[str] | None = None) -> None:
 
 def _carry_out(request: StudyRequest, command: str) -> None:
     """Run a request, and print the best settings."""
-    from kinarm.evaluation.experiments.table import COLUMNS, group_row
+    from kinarm.evaluation.experiments.table import COLUMNS
 
     study = request.run(command=command)
-    if len(study):
-        headings = [heading for heading, _ in COLUMNS]
-        print_table(headings, [group_row(group) for group in study.best(SHOWN)])
-        print(f"written: {request.folder / 'index.html'}, with tables and figures beside it")
-    else:
+    if not len(study):
         print("no training is finished")
+    elif not request.prints_csv:
+        print_columns(
+            request.chosen(COLUMNS),
+            [study.best(SHOWN)],
+            open_console(),
+            whole=bool(request.columns),
+            advice=CHOOSE,
+        )
+        if request.csv is not None:
+            print(f"written: {request.csv}")
+        print(f"written: {request.folder / 'index.html'}, with tables and figures beside it")
 
 
 SHOWN = 20

@@ -1,7 +1,5 @@
 """The files about an experiment: tables, figures and a page."""
 
-import csv
-import io
 import json
 from collections.abc import Mapping, Sequence
 from importlib.util import find_spec
@@ -13,6 +11,7 @@ import tomli_w
 from numpy.typing import NDArray
 
 from kinarm._files import write_atomically, write_text
+from kinarm._tables import csv_text
 from kinarm.evaluation.experiments import table
 from kinarm.evaluation.experiments.plan import Run
 from kinarm.evaluation.experiments.table import Group, identity, shorter, shown
@@ -69,13 +68,14 @@ def write_all(study: "Study", command: str = "") -> Path:
 
 def write_csv(path: Path, rows: list[dict[str, Any]]) -> None:
     """Write one line per row."""
-    text = io.StringIO()
-    writer = csv.DictWriter(text, list(rows[0]) if rows else ["key"], lineterminator="\n")
-    writer.writeheader()
-    for row in rows:
-        lists = [name for name, each in row.items() if isinstance(each, list | tuple)]
-        writer.writerow({**row, **{name: shown(row[name]) for name in lists}})
-    write_text(path, text.getvalue())
+    texts = [
+        {
+            name: shown(each) if isinstance(each, list | tuple) else each
+            for name, each in row.items()
+        }
+        for row in rows
+    ]
+    write_text(path, csv_text(texts))
 
 
 def _write_parquet(path: Path, rows: NDArray[Any]) -> None:
@@ -126,7 +126,7 @@ def _page(name: str, study: "Study", document: dict[str, Any], drawings: Mapping
         experiment=experiment,
         trials=experiment.trials,
         best=best.items(),
-        headings=[heading for heading, _ in table.COLUMNS],
+        headings=[column.heading for column in table.COLUMNS],
         rows=[table.group_row(group) for group in groups],
         rows_in_order=[table.group_row(group) for group in study.groups()],
         figures=[(name, TITLES[name], d[d.index("<svg") :]) for name, d in drawings.items()],

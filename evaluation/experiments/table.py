@@ -4,17 +4,20 @@ import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, NamedTuple
+from operator import attrgetter
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from kinarm._tables import ALWAYS, Column
 from kinarm.evaluation.experiments.experiment import Entry
 from kinarm.evaluation.experiments.plan import Run
 from kinarm.evaluation.experiments.runs import TrainedRun
 from kinarm.evaluation.metrics import METRICS
 from kinarm.evaluation.outcomes import Outcomes
 from kinarm.evaluation.statistics import Estimate, share_over_seeds, wilson_interval
+from kinarm.evaluation.table import SEEDS_PRIORITY, metric_column
 from kinarm.policies.config import TrainingConfig
 from kinarm.policies.oracle import OracleSolutions
 
@@ -74,6 +77,11 @@ class Group:
     def figures(self) -> dict[str, float]:
         """The figures of merit over all seeds; NaN for unknown ones."""
         return figures_of(Outcomes(tuple(run.outcomes for run in self.runs), self.bounds))
+
+    @property
+    def worst_seed(self) -> float:
+        """Success of the worst seed."""
+        return float(self.hits.mean(axis=1).min())
 
     @property
     def environment_steps(self) -> float:
@@ -150,27 +158,18 @@ LEVELS = (0.5, 0.8)
 """Shares of success that measure the speed of learning."""
 
 
-class Column(NamedTuple):
-    """A column of the table of groups."""
-
-    heading: str
-    text: Callable[[Group], str]
-
-
-def _figure(name: str) -> Callable[[Group], str]:
-    """A figure of merit as text; nothing for an unknown one."""
-    return lambda group: (
-        "" if np.isnan(value := group.figures[name]) else METRICS[name].write(value)
-    )
+def _estimates(group: Group) -> dict[str, Estimate]:
+    """Figures of merit by metric; success has an interval."""
+    known = {
+        name: Estimate(None if math.isnan(value) else value)
+        for name, value in group.figures.items()
+    }
+    return {**known, "success": group.success}
 
 
-def _interval(group: Group) -> str:
-    low, high = group.success.ci95 or (np.nan, np.nan)
-    return METRICS["success"].write_range(low, high).replace("..", "\N{EN DASH}")
-
-
-def _until(level: float) -> Callable[[Group], str]:
+def _until_column(level: float) -> Column[Group]:
     """Environment steps [thousands] and processor time [min] to a success level."""
+    name = f"until_{100 * level:.0f}"
 
     def text(group: Group) -> str:
         steps, _, seconds = group.until(level)
@@ -179,32 +178,50 @@ def _until(level: float) -> Callable[[Group], str]:
         time = "" if math.isnan(seconds) else f", {seconds / 60:.2f}"
         return f"{steps / 1e3:,.0f}{time}"
 
-    return text
+    def values(group: Group) -> dict[str, float | None]:
+        known = _until_entries(group, level)
+        return {
+            f"{name}_{part}": known[part] for part in ("environment_steps", "processor_seconds")
+        }
+
+    return Column(f"thousand steps, minutes to {level:.0%}", text, name, priority=1, values=values)
 
 
-COLUMNS = (
-    Column("trainings", lambda group: group.label),
-    Column("seeds", lambda group: str(len(group.runs))),
-    Column("success %", _figure("success")),
-    Column("95 %", _interval),
+def _number_column(
+    heading: str, name: str, value: Callable[[Group], float], per: float, priority: float
+) -> Column[Group]:
+    """The column of a number, which is shown per a unit."""
+    digits = 1 if heading.endswith("%") else 2
+    return Column(
+        heading,
+        lambda group: f"{value(group) / per:.{digits}f}",
+        name,
+        priority=priority,
+        values=lambda group: {name: value(group)},
+    )
+
+
+COLUMNS: tuple[Column[Group], ...] = (
     Column(
-        "worst seed %", lambda group: METRICS["success"].write(float(group.hits.mean(axis=1).min()))
+        "trainings",
+        attrgetter("label"),
+        priority=ALWAYS,
+        values=lambda group: {"trainings": group.label, **group.choices},
+        words=True,
     ),
-    Column("relative success %", _figure("relative_success")),
-    Column("collision %", _figure("collision")),
-    Column("median distance m", _figure("median_distance")),
-    Column("median steps", _figure("median_steps")),
-    Column("step ratio", _figure("step_ratio")),
-    Column("million steps", lambda group: f"{group.environment_steps / 1e6:.2f}"),
-    Column("minutes", lambda group: f"{group.processor_seconds / 60:.2f}"),
-    *(Column(f"thousand steps, minutes to {level:.0%}", _until(level)) for level in LEVELS),
+    Column("seeds", lambda group: len(group.runs), priority=SEEDS_PRIORITY),
+    *(metric_column(name, _estimates) for name in FIGURES),
+    _number_column("worst seed %", "worst_seed", attrgetter("worst_seed"), 0.01, 10.5),
+    _number_column("million steps", "environment_steps", attrgetter("environment_steps"), 1e6, 9),
+    _number_column("minutes", "processor_seconds", attrgetter("processor_seconds"), 60, 9),
+    *map(_until_column, LEVELS),
 )
 """Minutes are processor time without the trials of the policies."""
 
 
 def group_row(group: Group) -> tuple[str, ...]:
     """The row of a group."""
-    return tuple(column.text(group) for column in COLUMNS)
+    return tuple(str(column.cell(group)) for column in COLUMNS)
 
 
 def curve_rows(study: "Study") -> list[dict[str, Any]]:

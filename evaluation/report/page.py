@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from functools import partial
+from operator import attrgetter
 from pathlib import Path
 
 from kinarm._files import check_folder, write_text
@@ -15,7 +16,7 @@ from kinarm.evaluation.table import (
     REPLACED,
     SPREAD_PRIORITY,
     has_star,
-    metric_cell,
+    metric_column,
     metric_columns,
     telling_columns,
 )
@@ -76,7 +77,7 @@ def report_page(document: EvaluationDocument, evaluations: Sequence[Evaluation])
         worst=list(zip(problems, chosen, strict=True)),
         replay=replay_page(recordings).html,
         charts=charts,
-        success_cell=partial(metric_cell, "success"),
+        success_cell=metric_column("success", attrgetter("metrics")).cell,
         replaced=REPLACED,
         early_steps=EARLY_STEPS,
     )
