@@ -78,22 +78,30 @@ def all_columns() -> list[Column[Row]]:
     columns: list[Column[Row]] = [
         Column("problem", attrgetter("problem"), priority=ALWAYS, words=True),
         Column("policy", policy_label, priority=ALWAYS, words=True),
-        *(
-            Column(name, lambda row, name=name: getattr(row, name) or "", priority=ON_REQUEST)
-            for name in ("algorithm", "recipe", "trained_on", "trials")
-        ),
-        Column(
-            "seeds",
-            lambda row: Cell(str(len(row.members)) if isinstance(row, PooledResult) else ""),
-            meaning="trainings of a recipe that differ in their seed alone",
-            priority=SEEDS_PRIORITY,
-        ),
+        *map(_fact_column, ("algorithm", "recipe", "trained_on", "trials")),
     ]
     for name, metric in METRICS.items():
         columns.append(metric_column(name, attrgetter("metrics")))
+        if name == "success":
+            columns.append(_seeds_column())
         if metric.spread_heading:
             columns.append(spread_column(name))
     return columns
+
+
+def _fact_column(name: str) -> Column[Row]:
+    """A column of how a row was made."""
+    return Column(name, lambda row: getattr(row, name) or "", priority=ON_REQUEST, words=True)
+
+
+def _seeds_column() -> Column[Row]:
+    """The column of how many training seeds a row holds; empty without them."""
+    return Column(
+        "seeds",
+        lambda row: Cell(str(len(row.members)) if isinstance(row, PooledResult) else ""),
+        meaning="trainings of a recipe that differ in their seed alone",
+        priority=SEEDS_PRIORITY,
+    )
 
 
 def metric_columns() -> list[Column[Row]]:

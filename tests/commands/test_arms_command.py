@@ -10,6 +10,11 @@ from kinarm import arm_names
 from kinarm.arm_specification import ArmFile
 
 
+@pytest.fixture(autouse=True)
+def wide(monkeypatch):
+    monkeypatch.setenv("COLUMNS", "250")
+
+
 def rows(answer):
     """The lines of a table by their first word."""
     head, *lines = answer.out.splitlines()

@@ -59,7 +59,8 @@ def write(tmp_path, monkeypatch):
 
 
 @pytest.mark.parametrize("words", [(), ("list",)])
-def test_list_names_every_problem(run, words):
+def test_list_names_every_problem(run, words, monkeypatch):
+    monkeypatch.setenv("COLUMNS", "250")
     answer = run("kinarm-problem", *words)
     assert (answer.status, answer.err) == (0, "")
     head, *lines = answer.out.splitlines()

@@ -88,8 +88,8 @@ def test_on_a_terminal_there_is_a_bar(monkeypatch, colourful):
     )
 
 
-@pytest.mark.parametrize(("columns", "width"), [(None, 1000), ("70", 70)])
-def test_a_pipe_is_as_wide_as_it_takes_or_as_the_environment_says(monkeypatch, columns, width):
+@pytest.mark.parametrize(("columns", "width"), [(None, 120), ("70", 70)])
+def test_a_pipe_is_as_wide_as_pages_or_as_the_environment_says(monkeypatch, columns, width):
     monkeypatch.delenv("COLUMNS", raising=False)
     if columns:
         monkeypatch.setenv("COLUMNS", columns)
