@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from kinarm.errors import ProblemError
+from kinarm.errors import ProblemError, whole_number
 from kinarm.kernels.compiling import Array
 from kinarm.kernels.screening import deal, propose_starts, rejected_rows
 from kinarm.world import World
@@ -56,6 +56,7 @@ def draw_for_each(
     rngs : sequence of numpy.random.Generator
         Sources of randomness.
     """
+    whole_number("count", count, 0)
     arm, task, n_actions = world.arm, world.problem.task, world.n_actions
     spread = task.start_spread if start_spread is None else start_spread
     lower = arm.home + spread * (arm.lower - arm.home)

@@ -13,7 +13,7 @@ from kinarm._parallel import run_together
 from kinarm.arm import Arm
 from kinarm.chain import within_limits
 from kinarm.episodes import PAUSED, RUNNING, Control, Episodes, Rollouts, StepResult
-from kinarm.errors import InvalidInputError, StartInContactError, finite_array
+from kinarm.errors import LARGEST, InvalidInputError, StartInContactError, finite_array
 from kinarm.kernels.compiling import Array
 from kinarm.kernels.rollout import advance, allow_one_step, begin, refuse, results_of_step
 from kinarm.kernels.session import Session
@@ -238,6 +238,8 @@ class Simulator:
         """Copy starts and goals, or refuse them."""
         q = finite_array("starts", starts, (None, self.arm.n_joints))
         goal = finite_array("goals", goals, (len(q), 3))
+        if (farthest := np.abs(goal).max(initial=0.0)) > LARGEST:
+            raise InvalidInputError(f"goals must lie within {LARGEST:g} m, got {farthest:g}")
         return within_limits("starts", q, self.arm.chain, self.arm.joint_names), goal
 
     def _begin(

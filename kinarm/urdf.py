@@ -24,8 +24,8 @@ from kinarm.urdf_tree import MOVING, TreeJoint, chain_to, read_joints, read_robo
 USUAL_TOOL = "tool0"
 """The tool frame's name by ROS's convention."""
 
-FARTHEST_POSITION = 1e6
-"""Largest positions of joints [rad or m]: kernels' sines are exact up to there."""
+FARTHEST_POSITION = 1e4
+"""Largest positions of joints [rad or m]: kernels' sums stay within a nanometre up to there."""
 
 
 class Description(NamedTuple):

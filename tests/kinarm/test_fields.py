@@ -14,7 +14,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from kinarm._fields import Checked, field_docs, from_plain, init_fields, to_plain
-from kinarm.errors import InvalidInputError, ProblemError
+from kinarm.errors import InvalidInputError, ProblemError, check_range
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -79,6 +79,13 @@ class Bicycle(Checked):
     picture: Path | None = None
     spare: Wheel | None = None
     notes: dict[str, Any] = field(default_factory=dict)
+
+
+@pytest.mark.parametrize("sign", [1, -1])
+def test_numbers_are_at_most_a_million(sign):
+    check_range("size", sign * 1e6, {})
+    with pytest.raises(InvalidInputError, match=r"size must be at most 1e\+06"):
+        check_range("size", sign * np.nextafter(1e6, np.inf), {})
 
 
 wheels = st.builds(Wheel, radius=st.floats(1e-6, 1e6), spokes=st.integers(1, 2**63 - 1))

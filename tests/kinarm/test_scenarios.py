@@ -35,6 +35,11 @@ def test_starts_fill_the_limits(simulator):
     np.testing.assert_array_equal(starts[:, 5], 0)
 
 
+def test_a_negative_number_is_refused(simulator):
+    with pytest.raises(InvalidInputError, match="count must be a whole number of at least 0"):
+        simulator.sample(np.random.default_rng(0), -1)
+
+
 def test_start_spread_scales_the_range_about_home(simulator):
     home = (0.3, 0.1, 0.2, -0.4, 0.5, 0.0)
     near = changed(simulator, arm=ArmSpecification(home=home), start_spread=0.1)

@@ -241,6 +241,7 @@ class TestRefusals:
             ({"starts": np.zeros((2, 5))}, r"starts must have shape \(n, 6\), got \(2, 5\)"),
             ({"starts": np.full((1, 6), 9.0)}, r"starts\[0\] lies outside the limits"),
             ({"goals": [[0, np.inf, 0]]}, r"goals must be finite, got inf at \[0, 1\]"),
+            ({"goals": [[0, -1e200, 0]]}, r"goals must lie within 1e\+06 m, got 1e\+200"),
             ({"policies": np.zeros((1, 63, 5))}, r"actions must have shape \(1, 64, 5\)"),
             ({"policies": lambda _: np.full((1, 5), np.nan)}, "actions must be finite"),
             ({"policies": lambda _: HOME[:, :5], "policy_index": [0]}, "does not apply"),

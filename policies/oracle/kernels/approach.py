@@ -38,6 +38,9 @@ SMALLEST = 1e-6
 ROUNDING = 1e-9
 """Added to boxes and distances to cover rounding [rad, m]."""
 
+STEP_ROUNDING = 2.0**-51
+"""Most that a step rounds a joint's position by, as a share of its largest one."""
+
 
 Boxes = Any
 """Record of a `layout`."""
@@ -71,12 +74,19 @@ def layout(n: int, n_joints: int) -> Layout:
 
 
 @inlined
+def drift(chain: Chain, joint: int, steps: int) -> float:
+    """How far steps may lead beyond their limits, by rounding [rad or m]."""
+    farthest = max(abs(chain.lower[joint]), abs(chain.upper[joint]))
+    return max(ROUNDING, steps * STEP_ROUNDING * farthest)
+
+
+@inlined
 def within_steps(
     chain: Chain, start: Array, step_limit: Array, steps: int, lower: Array, upper: Array
 ) -> None:
     """Fill in corners of what joints can reach in some steps."""
     for i in range(step_limit.shape[0]):
-        reach = steps * step_limit[i] + ROUNDING
+        reach = steps * step_limit[i] + drift(chain, i, steps)
         lower[i] = max(chain.lower[i], start[i] - reach)
         upper[i] = min(chain.upper[i], start[i] + reach)
 
@@ -238,7 +248,7 @@ def search(
             if fewer:
                 needed = float(fewest)
                 for i in range(n):
-                    moved = abs(tried[0, i, lane] - start[i]) - 2.0 * ROUNDING
+                    moved = abs(tried[0, i, lane] - start[i]) - 2.0 * drift(chain, i, most)
                     needed = max(needed, moved / step_limit[i])
                 if np.ceil(needed) >= steps:
                     continue

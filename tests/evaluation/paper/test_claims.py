@@ -106,6 +106,26 @@ class TestWorlds:
         assert found["ppo-nearer"] == found["ppo-both"] == found["ars-samples"] == "undecided"
         assert found["sweep-rate"] == found["sweep-perturbations"] == "undecided"
 
+    @pytest.mark.parametrize(("share", "verdict"), [(0.6, "holds"), (0.4, "does not hold")])
+    def test_mostly_is_more_than_half(self, results_of, made_up_run, share, verdict):
+        distance = np.where(np.arange(TRIALS) % 10 < 10 * share, 0.1, 0.3)
+        found = verdicts(assess(results_of(lambda _: made_up_run(distance))))
+        assert found["ars-left"] == found["ars-right"] == verdict
+
+    @pytest.mark.parametrize(
+        ("better", "worse", "verdict"),
+        [(0.65, 0.35, "holds"), (0.35, 0.2, "does not hold"), (0.8, 0.65, "does not hold")],
+    )
+    def test_well_is_more_than_half_and_poorly_is_less(
+        self, results_of, made_up_run, better, worse, verdict
+    ):
+        def run_of(run):
+            left = trial_set(run.planned.config.problem, TRIALS, 0).goals[:, 1] > 0
+            share = np.where(left, better, worse)
+            return made_up_run(np.where(np.arange(TRIALS) % 20 < 20 * share, 0.1, 0.3))
+
+        assert verdicts(assess(results_of(run_of)))["ars-one-bench"] == verdict
+
     def test_other_readings_are_judged_by_their_own_trainings(
         self, results_of, as_the_paper_says, the_other_way_round
     ):

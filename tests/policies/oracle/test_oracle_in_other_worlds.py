@@ -84,6 +84,30 @@ class TestOtherWorlds:
         assert_reference_agrees(oracle, starts, goals, known)
         assert (known.steps >= known.steps_lower_bound)[known.reachable].all()
 
+    def test_far_and_long_motions_are_not_called_impossible(self, make_joint, write_robot):
+        """Far from zero each step of a slide rounds up: after 10 000, it is 6e-9 m ahead."""
+        unit = np.spacing(9000.0)
+        # A step of 0.1 m and 0.6 units in the last place of 9000, at a rate of 1 / s.
+        step = np.round(0.1 / unit) * unit + 0.6 * unit
+        limit = f'<limit lower="-1e4" upper="1e4" velocity="{float(step)!r}" effort="0"/>'
+        path = write_robot([make_joint("prismatic", axis="1 0 0", limit=limit)], tool="0 0 0")
+        problem = PROBLEMS["left"].replace(
+            arm=Arm.load(path),
+            scene=Scene(obstacles=(), ground=False),
+            time_step=1.0,
+            horizon=10_000,
+            tolerance=0.01,
+        )
+        oracle, start = Oracle(problem, threads=1), np.array([8300.0])
+        far = np.array([[9999.0, 0.0, 0.0]])
+        path = oracle.simulator.rollout_actions(
+            np.ones((1, 10_000, 1)), start[None], far, record=True
+        ).paths[0, :, 0]
+        ahead = path[-1] - (start + 10_000 * step)
+        assert ahead > 3e-9
+        goal = problem.load_arm().tool_position(path[-1:]) + [0.01 - 1e-11, 0.0, 0.0]
+        assert oracle.solve(start, goal).steps_lower_bound <= 10_000
+
     @pytest.mark.parametrize("name", ["sliding", "mesh"])
     def test_arms_of_other_shapes(self, simulators, name):
         oracle = Oracle(simulators[name].problem, threads=1)
