@@ -4,6 +4,7 @@ import os
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from functools import cache
+from threading import current_thread, main_thread
 from typing import Any
 
 import numpy as np
@@ -11,6 +12,12 @@ import numpy as np
 PARALLEL_STEPS = 8192
 BALANCED_STEPS = 16384
 SHARED_STEPS = 2048
+
+LONG_STEPS = 5_000_000
+"""Work of some seconds, at most, that the calling thread does without hearing of Ctrl-C."""
+
+NO_MORE = 2**62
+"""Number of a row that no batch has."""
 
 
 def available_threads() -> int:
@@ -53,7 +60,9 @@ def run_together(
     """Call ``kernel(counters, given(thread), *arrays)`` on several threads; add up the results.
 
     By a counter, zero at first, kernels share the rows. The calling thread is
-    number 0. A thread that comes too late is not awaited.
+    number 0. If it hears of interruptions, it waits where the work is long, and
+    they end it after the rows under way. A thread that comes too late is not
+    awaited.
 
     Parameters
     ----------
@@ -67,14 +76,20 @@ def run_together(
         Passed on to the kernel.
     """
     counters = np.zeros(1, dtype=np.int64)
-    if threads == 1 or work < SHARED_STEPS:
+    waits = work > LONG_STEPS and current_thread() is main_thread()
+    if work < SHARED_STEPS or (threads == 1 and not waits):
         return kernel(counters, given(0), *arrays)
     pool = thread_pool(os.getpid(), threads)
     helpers = [
-        pool.submit(kernel, counters, given(thread), *arrays) for thread in range(1, threads)
+        pool.submit(kernel, counters, given(thread), *arrays)
+        for thread in range(0 if waits else 1, threads)
     ]
-    total = kernel(counters, given(0), *arrays)
-    return total + sum(helper.result() for helper in helpers if not helper.cancel())
+    try:
+        total = helpers.pop(0).result() if waits else kernel(counters, given(0), *arrays)
+        return total + sum(helper.result() for helper in helpers if not helper.cancel())
+    except BaseException:
+        counters[0] = NO_MORE
+        raise
 
 
 @cache

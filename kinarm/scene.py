@@ -126,6 +126,9 @@ class GoalRegion(Checked):
         _check_box(f"goal region {self.name!r}", self.lower, self.upper, flat=True)
 
 
+MOST_MEMBERS = 1000
+"""Obstacles, and goal regions, at most: so many take seconds to prepare."""
+
 PAPER_BENCHES = (
     Obstacle(name="right bench", lower=(-0.5, -0.75, 0.0), upper=(0.5, -0.55, 0.3)),
     Obstacle(name="left bench", lower=(-0.5, 0.55, 0.0), upper=(0.5, 0.75, 0.3)),
@@ -170,6 +173,8 @@ class Scene(Checked):
     def __post_init__(self) -> None:
         super().__post_init__()
         for what, members in (("obstacle", self.obstacles), ("goal region", self.goal_regions)):
+            if len(members) > MOST_MEMBERS:
+                raise ProblemError(f"{len(members)} {what}s: at most {MOST_MEMBERS} are possible")
             names = [member.name for member in members]
             for name in names:
                 if names.count(name) > 1:

@@ -18,6 +18,9 @@ FARTHEST = 1e4
 MOVING = ("revolute", "prismatic", "continuous")
 """Kinds of joints that move."""
 
+MOST_SHAPES = 500
+"""Collision shapes at most: the pairs of so many take seconds to prepare."""
+
 SHAPES = ("box", "sphere", "cylinder", "capsule", "mesh")
 
 NUMBERS: dict[str, dict[str, tuple[int, str]]] = {
@@ -89,6 +92,9 @@ def read_robot(path: Path) -> Element:
     for part in (robot, *robot):
         for element in [each for each in part if each.tag not in NEEDED.get(part.tag, (each.tag,))]:
             part.remove(element)
+    shapes = len(robot.findall("link/collision"))
+    if shapes > MOST_SHAPES:
+        raise ArmError(f"{shapes} collision shapes; at most {MOST_SHAPES} can be tested in pairs")
     for joint in robot.findall("joint"):
         _check_joint(joint, f"joint {joint.get('name')!r}")
     for link in robot.findall("link"):

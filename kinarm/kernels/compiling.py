@@ -10,6 +10,7 @@ of all files whose helpers and constants are compiled in.
 
 import gc
 import hashlib
+import pickle
 import sys
 from collections.abc import Callable
 from contextlib import suppress
@@ -20,7 +21,7 @@ from typing import Any, TypeVar, cast
 import llvmlite
 import numpy as np
 from numba import njit, types
-from numba.core.caching import FunctionCache
+from numba.core.caching import FunctionCache, IndexDataCacheFile
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import CompilerBase, DefaultPassBuilder
 from numpy.typing import NDArray
@@ -181,11 +182,37 @@ class HelperCompiler(KernelCompiler):
     library = LinkedLibrary
 
 
+class CheckedFile(IndexDataCacheFile):
+    """Numba's files of a kernel's machine code, with a checksum: damage is noticed."""
+
+    def save(self, key: Any, data: Any) -> None:
+        """Save machine code for a signature and processor."""
+        content = self._dump(data)
+        super().save(key, (self._checksum(key, content), content))
+
+    def load(self, key: Any) -> Any:
+        """Load what was saved for them, None if nothing; damage raises an exception."""
+        found = super().load(key)
+        if found is None:
+            return None
+        checksum, content = found
+        if checksum != self._checksum(key, content):
+            raise ValueError("damaged machine code")
+        return pickle.loads(content)
+
+    def _checksum(self, key: Any, content: bytes) -> bytes:
+        return hashlib.sha256(repr((self._source_stamp, key)).encode() + content).digest()
+
+
 class KernelCache(FunctionCache):
     """A kernel's machine code on disk; damage costs only time.
 
     Processes with the same sources and versions of Numba and llvmlite share it.
     """
+
+    def __init__(self, function: Callable[..., Any]) -> None:
+        super().__init__(function)
+        self._cache_file = CheckedFile(self._cache_path, self._impl.filename_base, "")
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
         """Look machine code up; None if it is missing or damaged."""

@@ -1,6 +1,9 @@
 """Kernels over ranges of rows."""
 
+import os
+import signal
 import threading
+import time
 
 import numpy as np
 import pytest
@@ -58,6 +61,22 @@ class TestTogether:
         np.testing.assert_array_equal(counts, 1)
         assert threading.current_thread() in seen
         assert len(seen) <= at_most
+
+    @pytest.mark.parametrize("threads", [1, 2])
+    def test_an_interruption_ends_long_work_after_the_rows_under_way(self, threads):
+        ended = threading.Semaphore(0)
+
+        def kernel(counters, thread):
+            while counters[0] < 10**6:
+                counters[0] += 1
+                time.sleep(0.01)
+            ended.release()
+            return 0
+
+        threading.Timer(0.3, os.kill, (os.getpid(), signal.SIGINT)).start()
+        with pytest.raises(KeyboardInterrupt):
+            run_together(kernel, 10**9, threads, int)
+        assert all(ended.acquire(timeout=60) for _ in range(threads))
 
     def test_a_thread_that_comes_too_late_is_not_waited_for(self):
         busy, free = [threading.Event() for _ in range(2)]

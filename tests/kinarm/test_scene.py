@@ -52,6 +52,7 @@ def test_size_and_centre():
         (region, {"upper": (1, -2, 0.4)}, "goal region 'top' is empty"),
         (region, {"lower": (0.5, math.inf, 0.4)}, "lower must be finite, got inf"),
         (Scene, {"obstacles": 2 * (obstacle(),)}, "two obstacles are called 'table'"),
+        (Scene, {"obstacles": 1001 * (obstacle(),)}, "1001 obstacles: at most 1000"),
         (Scene, {"goal_regions": 2 * (region(),)}, "two goal regions are called 'top'"),
         (Scene, {"cube_edge": -0.01}, "cube_edge"),
         (Scene, {"cube_edge": math.nan}, "cube_edge"),

@@ -272,6 +272,11 @@ class TestRefusals:
         with pytest.raises(ArmError, match="no moving joint"):
             Arm.load(write_robot([make_joint("fixed", limit="")]))
 
+    def test_more_shapes_than_can_be_paired(self, make_joint, make_collision, write_robot):
+        many = 501 * make_collision('<sphere radius="0.05"/>')
+        with pytest.raises(ArmError, match="501 collision shapes; at most 500"):
+            Arm.load(write_robot([make_joint()], {1: many}))
+
     @pytest.mark.parametrize("shape", ['<box size="1 1 -1"/>', "<cone/>", "<sphere/>", ""])
     def test_shapes(self, make_joint, make_collision, write_robot, shape, capfd):
         path = write_robot([make_joint()], {1: make_collision(shape)})

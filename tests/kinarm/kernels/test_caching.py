@@ -53,6 +53,15 @@ def test_damaged_files_are_made_anew(filled):
     assert [found(filled[0]) for _ in range(2)] == [0, 1]
 
 
+def test_a_flipped_bit_of_machine_code_is_noticed(filled):
+    (path,) = filled[0].rglob("*.nbc")
+    content = bytearray(path.read_bytes())
+    # In the middle of an operation: unnoticed, the kernel would run and compute something else.
+    content[content.index(b"\x7fELF") + 256] ^= 1
+    path.write_bytes(content)
+    assert [found(filled[0]) for _ in range(2)] == [0, 1]
+
+
 SOURCES = {
     "constants.py": "FACTOR = 2.0\n",
     "kernels/inner.py": """

@@ -105,7 +105,7 @@ class TestOtherWorlds:
         ).paths[0, :, 0]
         ahead = path[-1] - (start + 10_000 * step)
         assert ahead > 3e-9
-        goal = problem.load_arm().tool_position(path[-1:]) + [0.01 - 1e-11, 0.0, 0.0]
+        goal = problem.load_arm().tool_position(path[-1:]) + np.array([0.01 - 1e-11, 0.0, 0.0])
         assert oracle.solve(start, goal).steps_lower_bound <= 10_000
 
     @pytest.mark.parametrize("name", ["sliding", "mesh"])
