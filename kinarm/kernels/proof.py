@@ -29,8 +29,11 @@ from kinarm.kernels.planes import (
 )
 from kinarm.kernels.session import Alone, Block, put, take, take_rows
 
-MARGIN = 1e-6
-"""Distance below which freedom is not claimed [m]: Coal's tolerance."""
+MARGIN, DEPTH = 2e-6, 1e-6
+"""Distance beyond which freedom is claimed, and depth beyond which contact is [m].
+
+Coal calls contact what is up to 1e-6 m apart, and some 1e-9 m more.
+"""
 
 
 @inlined
@@ -309,7 +312,7 @@ def first_contact(
     else:
         place_between(k, tested, lane, chain, block, alone)
     for pair in range(shapes.pairs.shape[0]):
-        if is_exact(shapes, pair) and overlap(shapes, pair, alone.before) > MARGIN:
+        if is_exact(shapes, pair) and overlap(shapes, pair, alone.before) > DEPTH:
             return pair + 1
         if not is_proven_apart(pair, lane, shapes, block, alone):
             return 0

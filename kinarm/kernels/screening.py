@@ -13,7 +13,7 @@ from kinarm.contact_shapes import ContactShapes
 from kinarm.kernels.compiling import Array, kernel, lean_kernel
 from kinarm.kernels.kinematics import forward_kinematics, to_world
 from kinarm.kernels.lanes import LANES, lane_bits
-from kinarm.kernels.proof import MARGIN, deepest_overlap, prove_configurations
+from kinarm.kernels.proof import DEPTH, deepest_overlap, prove_configurations
 from kinarm.kernels.session import Alone, Block, put, take
 
 
@@ -142,7 +142,7 @@ def screen(
         for lane in range(LANES):
             put(configurations, start + min(lane, filled - 1), block.q, 0, lane)
         forward_kinematics(chain, block.q, 0, block.after)
-        touched = lane_bits(deepest_overlap(shapes, block.after) > MARGIN)
+        touched = lane_bits(deepest_overlap(shapes, block.after) > DEPTH)
         apart = prove_configurations(shapes, touched, filled, block, alone)
         x, y, z = to_world(block.after, n_joints, tool[0], tool[1], tool[2])
         block.goal[0, 0], block.goal[0, 1], block.goal[0, 2] = x, y, z

@@ -9,14 +9,14 @@ def random_configurations(simulator, seed, count):
     return np.random.default_rng(seed).uniform(arm.lower, arm.upper, (count, arm.n_joints))
 
 
-def contact_boundary(simulator, seed, count):
+def contact_boundary(simulator, seed, count, halvings=34):
     """Pairs of configurations, free and touching, that are closer than 1e-9 to each other."""
     judge = simulator.world.contact_model.in_contact
     candidates = random_configurations(simulator, seed, 8 * count)
     touching = judge(candidates)
     n = min(count, touching.sum(), (~touching).sum())
     free, hit = candidates[~touching][:n], candidates[touching][:n]
-    for _ in range(34):
+    for _ in range(halvings):
         middle = (free + hit) / 2
         touches = judge(middle)[:, None]
         free, hit = np.where(touches, free, middle), np.where(touches, middle, hit)

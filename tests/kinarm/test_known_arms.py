@@ -12,7 +12,9 @@ from reference_episodes import compare_actions
 
 from kinarm.arm import Arm
 from kinarm.collision import ContactModel
-from kinarm.scene import Scene
+from kinarm.problem import ReachProblem
+from kinarm.scene import GoalRegion, Obstacle, Scene
+from kinarm.simulator import Simulator
 
 pytestmark = INSTALLED
 
@@ -146,3 +148,19 @@ def test_the_proof_never_clears_what_touches(simulator):
 def test_rollouts_equal_the_reference_path(simulator):
     _, collision, count = compare_actions(simulator, 5, 12)
     assert 0 < collision <= count
+
+
+@pytest.mark.parametrize("size", [0.1, 10.0])
+def test_freedom_is_not_claimed_where_coal_only_just_finds_contact(size):
+    """Between shapes with corners, Coal finds contact at gaps of 1e-6 m, and hardly more."""
+    front = Obstacle(name="front", lower=(0.4, -size, 0.2), upper=(0.4 + size, size, 0.2 + size))
+    back = Obstacle(name="back", lower=(-0.3 - size, -size, 0.4), upper=(-0.3, size, 0.4 + size))
+    air = GoalRegion(name="air", lower=(0.1, 0.1, 0.6), upper=(0.2, 0.2, 0.7))
+    scene = Scene(obstacles=(front, back), goal_regions=(air,))
+    problem = ReachProblem.load("right").replace(arm="panda", scene=scene, goal_regions=("air",))
+    simulator = Simulator(problem)
+    # Closer than a distance in which anything changes.
+    touching = contact_boundary(simulator, 3, 1500, halvings=60)[1]
+    gaps = simulator.world.clearance(touching).distance
+    assert (np.abs(gaps - 1e-6) < 1e-9).sum() > 20
+    assert not simulator.world.proven(touching)[1].any()

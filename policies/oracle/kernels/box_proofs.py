@@ -29,7 +29,7 @@ from kinarm.kernels.distance import between_segments, closest_to_box, turned_bac
 from kinarm.kernels.kinematics import forward_kinematics, point_jacobian, to_world
 from kinarm.kernels.lanes import any_lane, select
 from kinarm.kernels.planes import axis_in_world
-from kinarm.kernels.proof import MARGIN, is_exact
+from kinarm.kernels.proof import DEPTH, is_exact
 
 SWEEPS = 3
 """Passes of the descent over the joints."""
@@ -271,7 +271,7 @@ def overlaps(
         a, b, reach = axis_of(shapes, i, poses)
         middle = along(a, b, 0.5)
         # Coal, whose iterations are no more precise, decides what just touches.
-        radius = capsules[i, 6] - MARGIN
+        radius = capsules[i, 6] - DEPTH
         if kind == BETWEEN_CAPSULES:
             c, d, beyond = axis_of(shapes, j, poses)
             other, radius = along(c, d, 0.5), radius + capsules[j, 6]
