@@ -9,7 +9,9 @@ from pathlib import Path
 
 from browser import open_page
 from PIL import Image
-from players import make_replay
+
+from kinarm.evaluation import ReplayRequest
+from kinarm.viewer import replay_page
 
 OUT = Path(__file__).parent / "_static" / "replay.png"
 WIDTH, HEIGHT = 1120, 680
@@ -20,7 +22,11 @@ def main() -> None:
     """Make a replay, show a step of it and take its picture."""
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "replay.html"
-        make_replay("ppo-best-both", "right", [0, 1, 3], "oracle").save(path)
+        request = ReplayRequest(
+            compare=("ppo-best-both", "oracle"), problem="right", trial=(0, 1, 3)
+        )
+        played, oracle = request.recordings()
+        replay_page(played, path, ghosts=oracle)
         with open_page(path, WIDTH, HEIGHT) as page:
             page.wait_for_selector("body[data-ready]")
             page.evaluate(f"kinarm.seek({STEP})")

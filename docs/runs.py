@@ -16,8 +16,8 @@ from tempfile import TemporaryDirectory, TemporaryFile
 from typing import Any
 from unittest import mock
 
+from comments import FILE
 from docutils import nodes
-from docutils.parsers.rst import directives
 from sphinx.application import Sphinx
 from sphinx.errors import ExtensionError
 from sphinx.util.docutils import SphinxDirective
@@ -121,35 +121,31 @@ def shown(name: str, content: bytes) -> str:
 class KinarmRun(SphinxDirective):
     """Show Python or command lines (``sh``), run them, and show what they printed and made.
 
-    What has an option ``file`` is written to that file instead, for the blocks after it. Command
-    lines with an option ``fails`` end with a message, which is shown.
+    A word ``fails`` behind the language says that command lines end with a message, which is
+    shown, and ``shows=FILE`` which file is shown. A block that names a file is written to it.
     """
 
     has_content = True
     required_arguments = 1
-    option_spec = {  # noqa: RUF012
-        "shows": directives.unchanged,
-        "file": directives.unchanged,
-        "fails": directives.flag,
-    }
+    optional_arguments = 1
 
     def run(self) -> list[nodes.Node]:
-        language, code = self.arguments[0], "\n".join(self.content)
-        page = self._page()
-        if name := self.options.get("file"):
-            page.write(name, code)
-            title = nodes.paragraph("", "", nodes.literal(name, name), classes=["file-name"])
-            return [title, nodes.literal_block(code, code, language=language)]
+        language, *words = self.arguments
+        options = dict(word.partition("=")[::2] for word in words)
+        page, code = self._page(), "\n".join(self.content)
+        found: list[nodes.Node] = [nodes.literal_block(code, code, language=language)]
+        if file := FILE.match(code):
+            page.write(file[1], code)
+            return found
         line = self.lineno + self.content_offset + 1
         if language == "python":
             printed = page.run_python(code, line)
         else:
-            printed = page.run_commands(code, line, fails="fails" in self.options)
-        found: list[nodes.Node] = [nodes.literal_block(code, code, language=language)]
+            printed = page.run_commands(code, line, fails="fails" in options)
         if printed.strip():
             kinds = ["printed"] if DRAWN.intersection(printed) else ["printed", "wraps"]
             found.append(nodes.literal_block(printed, printed, language="text", classes=kinds))
-        if made := self.options.get("shows"):
+        if made := options.get("shows"):
             found.append(nodes.raw("", shown(made, page.read(made)), format="html"))
         return found
 

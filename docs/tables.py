@@ -1,14 +1,21 @@
-"""Sphinx directive ``kinarm-table``: tables that are read from the code, so that they stay true."""
+"""What pages hold of the code and of recorded results: ``python docs/tables.py`` writes it.
 
+It stands between ``<!-- table NAME -->``, ``<!-- text FILE -->`` or ``<!-- code FILE -->`` and
+``<!-- end -->``. A test compares it with what would be written now.
+"""
+
+import os
+import re
+import shlex
+import textwrap
 from collections.abc import Mapping
 from dataclasses import fields
+from pathlib import Path
 
 import numpy as np
-from docutils import nodes
-from sphinx.application import Sphinx
-from sphinx.util.docutils import SphinxDirective
 
 from kinarm import PROBLEMS, REWARD_TERMS, Arm, RewardWeights, Scene, Simulator
+from kinarm.__main__ import COMMANDS
 from kinarm._fields import summary_of
 from kinarm.contact_shapes import enclosing_capsule
 from kinarm.envs import ENVIRONMENTS
@@ -18,6 +25,8 @@ from kinarm.evaluation.outcomes import HOLDING_STEPS
 from kinarm.evaluation.report.templating import markdown_table
 from kinarm.observation import OBSERVATION, part_slices
 from kinarm.policies import find_learner
+
+DOCS = Path(__file__).parent
 
 SYMBOLS = {
     "n": "number of trials; of several training seeds, all their trials together",
@@ -190,6 +199,12 @@ def symbols_table() -> str:
     )
 
 
+def programs_table() -> str:
+    """The programs, by what one wants to do."""
+    rows = [[purpose, f"`kinarm-{name}`"] for name, (_, purpose) in COMMANDS.items()]
+    return markdown_table(["to", "type"], rows)
+
+
 TABLES = {
     "arm": lambda: arm_table("paper"),
     "capsules": lambda: capsule_table("paper"),
@@ -197,6 +212,7 @@ TABLES = {
     "shipped-problems": shipped_problems_table,
     "scene": scene_table,
     "problems": problems_table,
+    "programs": programs_table,
     "reward": reward_table,
     "observation": lambda: observation_table(6),
     "metrics": metrics_table,
@@ -206,16 +222,54 @@ TABLES = {
 }
 
 
-class KinarmTable(SphinxDirective):
-    """Insert one of `TABLES`, in a MyST page."""
-
-    required_arguments = 1
-
-    def run(self) -> list[nodes.Node]:
-        return self.parse_text_to_nodes(TABLES[self.arguments[0]]())
+PART = re.compile(r"^<!-- (table|text|code) (.+) -->\n(?:.*\n)*?<!-- end -->$", re.M)
+"""What stands in a page between two comments, and comes from elsewhere."""
 
 
-def setup(app: Sphinx) -> dict[str, bool]:
-    """Register the directive."""
-    app.add_directive("kinarm-table", KinarmTable)
-    return {"parallel_read_safe": True, "parallel_write_safe": True}
+def filled(page: Path) -> str:
+    """A page with tables, texts and code as they are now."""
+    return PART.sub(lambda part: _part(page.parent, *part.groups()), page.read_text("utf-8"))
+
+
+def _part(folder: Path, kind: str, told: str) -> str:
+    """A part of a page in a folder: which one, and from and before which words of its file."""
+    name, *cuts = shlex.split(told)
+    if kind == "table":
+        made = f"\n{TABLES[name]()}\n"
+    else:
+        source = (folder / name).resolve()
+        text = _between(source.read_text("utf-8"), **dict(cut.split("=", 1) for cut in cuts))
+        if kind == "code":
+            made = f"```python\n{textwrap.dedent(text).strip()}\n```\n"
+        else:
+            made = f"\n{_moved(text, source.parent, folder).strip()}\n\n"
+    return f"<!-- {kind} {told} -->\n{made}<!-- end -->"
+
+
+def _between(text: str, before: str = "", **begin: str) -> str:
+    """Lines of a text, from the first that holds some words, and before one with others."""
+    start = text.rfind("\n", 0, text.index(begin.get("from", ""))) + 1
+    return text[start : text.rfind("\n", 0, text.index(before, start)) + 1 if before else None]
+
+
+def _moved(text: str, source: Path, folder: Path) -> str:
+    """Markdown of another folder, with its headings a level lower."""
+    text = re.sub(r"^#", "##", text, flags=re.M)
+    return re.sub(
+        r"\]\((?!\w+:|#)([^)]+)\)",
+        lambda link: f"]({os.path.relpath(source / link[1], folder)})",
+        text,
+    )
+
+
+def main() -> None:
+    """Write what has changed into the pages."""
+    for page in sorted(DOCS.glob("**/*.md")):
+        text = filled(page)
+        if text != page.read_text("utf-8"):
+            page.write_text(text, "utf-8")
+            print(page)
+
+
+if __name__ == "__main__":
+    main()

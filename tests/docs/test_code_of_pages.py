@@ -1,7 +1,7 @@
 """Code and commands of README and pages run as they are written, or the exceptions say why not.
 
-Blocks ``{kinarm-run}`` run when the site is built, those with a name in tests of their own, and
-the README's Python in ``tests/test_readme.py``.
+Blocks that are told to ``run`` do so when the site is built, those with a name in tests of their
+own, and the README's Python in ``tests/test_readme.py``.
 """
 
 import contextlib
@@ -86,13 +86,11 @@ WRITTEN = {
 
 def plain_blocks(path: Path) -> list[Block]:
     """Blocks of a page that nothing else runs."""
-    ran_elsewhere = {"kinarm-run", "literalinclude", "include"}
     return [
         block
         for block in blocks(path)
-        if block.language in ("python", "sh", "bash", "console", "toml")
-        and block.directive not in ran_elsewhere
-        and "name" not in block.options
+        if (block.language in ("python", "sh") or block.file)
+        and not block.told
         and (path.name, block.language) != ("README.md", "python")
     ]
 
@@ -156,9 +154,8 @@ def skip_without_what_is_needed(code: str) -> None:
 def test_a_page_does_what_it_says(name: str, folder: Path) -> None:
     names: dict[str, object] = {"__name__": "__main__"}
     for block in plain_blocks(PAGES[name]):
-        if block.language == "toml":
-            if title := re.match(r"# (\S+\.toml)$", block.code, re.M):
-                (folder / title[1]).write_text(FEWER.sub(r"\1 = 1", block.code))
+        if block.file:
+            (folder / block.file).write_text(FEWER.sub(r"\1 = 1", block.code))
         elif block.language == "python":
             if not is_exception(block.code):
                 skip_without_what_is_needed(block.code)
@@ -183,12 +180,16 @@ def test_exceptions_are_of_commands_that_pages_show() -> None:
     assert idle == []
 
 
+def test_every_block_is_run_or_saved_or_comes_from_elsewhere() -> None:
+    every = [block for path in pages().values() for block in blocks(path)]
+    assert {block.told for block in every} == {"", "run", "name", "code"}
+    idle = {each.language for each in every if not (each.told or each.file)}
+    assert idle == {"python", "sh", "text", "bibtex", "dockerfile"}
+
+
 def test_blocks_with_a_name_are_run_by_a_test() -> None:
     tests = "".join(path.read_text() for path in (ROOT / "tests").rglob("test_*.py"))
     named = [
-        block.options["name"]
-        for path in pages().values()
-        for block in blocks(path)
-        if block.directive == "code-block" and "name" in block.options
+        block.about for path in pages().values() for block in blocks(path) if block.told == "name"
     ]
     assert [name for name in named if name not in tests] == []

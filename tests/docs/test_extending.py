@@ -2,7 +2,6 @@
 
 import json
 import os
-import re
 import shlex
 import shutil
 import subprocess
@@ -14,6 +13,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from joblib.externals.loky import get_reusable_executor
+from pages import ROOT, named_blocks
 
 from kinarm.evaluation import Study
 from kinarm.evaluation.commands import evaluate, replay, train
@@ -24,11 +24,7 @@ from kinarm.evaluation.experiments.page import write_all
 from kinarm.policies import learners, load_policy, training
 from kinarm.problem import ReachProblem
 
-ROOT = Path(__file__).resolve().parents[2]
-PAGE = (ROOT / "docs" / "how-to" / "extending.md").read_text(encoding="utf-8")
-BLOCKS = dict(
-    re.findall(r"```\{code-block\} \w+\n:name: (\S+)\n\n(.*?)```", PAGE, re.MULTILINE | re.DOTALL)
-)
+BLOCKS = named_blocks(ROOT / "docs" / "how-to" / "extending.md")
 MAINS = {"kinarm-train": train.main, "kinarm-eval": evaluate.main, "kinarm-replay": replay.main}
 
 

@@ -1,14 +1,14 @@
 """Pages that are made from the code hold all of it."""
 
 import sys
-from pathlib import Path
 from types import ModuleType
 
 import pytest
+from pages import DOCS, pages
 
 from kinarm.evaluation.metrics import METRICS
 
-DOCS = Path(__file__).resolve().parents[2] / "docs"
+PAGES = {name: path for name, path in pages().items() if "<!-- end -->" in path.read_text()}
 
 
 def module(monkeypatch: pytest.MonkeyPatch, name: str) -> ModuleType:
@@ -41,3 +41,9 @@ def test_every_figure_is_defined(monkeypatch: pytest.MonkeyPatch) -> None:
     assert [
         letter for letter in tables.SYMBOLS if f"| {letter} |" not in tables.symbols_table()
     ] == []
+
+
+@pytest.mark.parametrize("name", PAGES)
+def test_a_page_holds_what_would_be_written_now(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    tables = module(monkeypatch, "tables")
+    assert tables.filled(PAGES[name]) == PAGES[name].read_text()

@@ -8,12 +8,12 @@ from pages import ROOT, anchors, links, pages
 PAGES = pages()
 OUTSIDE = ("https://", "http://", "mailto:")
 
-COMMANDS = "```{kinarm-commands}"
+COMMANDS = "<!-- {kinarm-commands}"
 """On a page with it, headings are made by the build: see `test_built_site.py` for their anchors."""
 
 
 def has_anchor(page: Path, anchor: str) -> bool:
-    """Whether a page has a heading or a label, or may get it from the build."""
+    """Whether a page has a heading, or may get it from the build."""
     return anchor in anchors(page) or COMMANDS in page.read_text()
 
 
@@ -42,10 +42,10 @@ def test_links_lead_somewhere(name):
 
 
 def test_what_leads_nowhere_is_noticed(tmp_path):
-    (tmp_path / "other.md").write_text("# Units: [rad], `q`\n(label)=\n")
+    (tmp_path / "other.md").write_text("# Units: [rad], `q`\n")
     page = tmp_path / "page.md"
     page.write_text(
-        "# Top\n[a](other.md#units-rad-q) [b](#top) [c](other.md#label) ![d](missing.png)\n"
+        "# Top\n[a](other.md#units-rad-q) [b](#top) ![d](missing.png)\n"
         "[e](other.md#none) [f](#label) [g](https://example.org)\n```\n[h](code.md)\n```\n"
     )
     assert broken(page) == ["missing.png", "other.md#none", "#label"]

@@ -5,16 +5,14 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import NamedTuple
 
+from docs.comments import BLOCK, FILE
+
 ROOT = Path(__file__).resolve().parents[2]
 DOCS = ROOT / "docs"
 MADE = ("_build", "gallery")
 
-FENCED = re.compile(r"^(?P<fence>`{3,}|:{3,})(?P<info>.*)\n(?P<body>(?:.*\n)*?)(?P=fence)$", re.M)
-INFO = re.compile(r"(?:\{(?P<directive>[\w-]+)\})? *(?P<language>\S*)")
-OPTION = re.compile(r"^:([\w-]+): *(.*)\n", re.M)
 LINK = re.compile(r"\]\(<?([^)\s>]+)")
 HEADING = re.compile(r"^#+ +(.+?) *$", re.M)
-LABEL = re.compile(r"^\((\S+)\)=$", re.M)
 
 
 class Block(NamedTuple):
@@ -22,19 +20,22 @@ class Block(NamedTuple):
 
     Attributes
     ----------
-    directive : str
-        What reads it, such as ``kinarm-run``; empty for plain code.
+    told : str
+        First word of the comment before it, such as ``run``, ``name`` or ``code``, or none.
+    about : str
+        The words behind it.
     language : str
         Such as ``python`` or ``sh``.
-    options : dict
-        Options of the directive.
+    file : str
+        File that the reader saves it as, or none.
     code : str
         The text.
     """
 
-    directive: str
+    told: str
+    about: str
     language: str
-    options: dict[str, str]
+    file: str
     code: str
 
 
@@ -47,23 +48,25 @@ def pages() -> dict[str, Path]:
 
 def blocks(path: Path) -> Iterator[Block]:
     """Fenced blocks of a page, in their order."""
-    for match in FENCED.finditer(path.read_text(encoding="utf-8")):
-        info = INFO.match(match["info"])
-        body, options = match["body"], {}
-        while info["directive"] and (option := OPTION.match(body)):
-            options[option[1]] = option[2]
-            body = body[option.end() :]
-        yield Block(info["directive"] or "", info["language"], options, body.lstrip("\n"))
+    for match in BLOCK.finditer(path.read_text(encoding="utf-8")):
+        told, _, about = (match["told"] or "").partition(" ")
+        file = FILE.match(match["code"])
+        yield Block(told, about, match["language"], file[1] if file else "", match["code"])
+
+
+def named_blocks(path: Path) -> dict[str, str]:
+    """Code that has a name, or that the reader saves as a file, by that name."""
+    named = ((each.file or each.about, each) for each in blocks(path))
+    return {name: each.code for name, each in named if each.file or each.told == "name"}
 
 
 def links(path: Path) -> list[str]:
     """Targets of the links and pictures of a page."""
-    return LINK.findall(FENCED.sub("", path.read_text(encoding="utf-8")))
+    return LINK.findall(BLOCK.sub("", path.read_text(encoding="utf-8")))
 
 
 def anchors(path: Path) -> set[str]:
-    """What links to a page may name behind a ``#``: headings in the spelling of GitHub, labels."""
-    text = FENCED.sub("", path.read_text(encoding="utf-8"))
+    """What links to a page may name behind a ``#``: headings in the spelling of GitHub."""
+    text = BLOCK.sub("", path.read_text(encoding="utf-8"))
     named = re.sub(r"\[([^\]]*)\]\([^)]*\)", r"\1", "\n".join(HEADING.findall(text)))
-    kept = re.sub(r"[^\w\- \n]", "", named.lower()).replace(" ", "-")
-    return {*kept.split("\n"), *LABEL.findall(text)}
+    return {*re.sub(r"[^\w\- \n]", "", named.lower()).replace(" ", "-").split("\n")}

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from pages import DOCS, named_blocks
 
 pytest.importorskip("rl_zoo3")
 
@@ -16,9 +17,8 @@ from kinarm.policies import zoo_hyperparameters
 
 pytestmark = pytest.mark.slow
 
-DOCS = Path(__file__).resolve().parents[2] / "docs"
 PAGE = (DOCS / "how-to" / "rl_zoo.md").read_text(encoding="utf-8")
-BLOCKS = dict(re.findall(r"```\{code-block\} sh\n:name: (\S+)\n\n(.*?)```", PAGE, re.DOTALL))
+BLOCKS = named_blocks(DOCS / "how-to" / "rl_zoo.md")
 FLAT, GOALS = "kinarm/ReachRight-v0", "kinarm/ReachGoalRight-v0"
 SMALL = {
     "ppo": ["n_envs:4", "batch_size:64"],

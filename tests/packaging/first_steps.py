@@ -19,6 +19,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "docs"))
 
 from browser import open_page
@@ -70,7 +71,7 @@ def typed() -> Iterator[str]:
         raise SystemExit(f"{readme.name} does not say: {', '.join(missing)}")
     yield INSTALL
     for block in blocks(tutorial):
-        if block.directive != "kinarm-run":
+        if block.told != "run":
             continue
         if block.language == "sh":
             yield from block.code.splitlines()
