@@ -92,7 +92,12 @@ class EvaluationRequest(ProblemOptions, TableOptions):
 
     policies: tuple[str, ...] = field(
         default=(),
-        metadata={"flag": "--policy", "metavar": "NAME_OR_FILE", "completes": policy_choices},
+        metadata={
+            "flag": "--policy",
+            "bare": True,
+            "metavar": "NAME_OR_FILE",
+            "completes": policy_choices,
+        },
     )
     problems: tuple[str, ...] = field(
         default=(),

@@ -42,10 +42,11 @@ def add_options(
     a field may be left out.
 
     A field's metadata may hold ``flag`` (another name of the option; without
-    dashes, of a positional argument), ``metavar``, ``repeat`` (repetitions of
-    the option give a tuple, else its several values), ``parse`` (makes the
-    value of the text), ``names`` (lists names for help and completion) and
-    ``completes`` (lists them for completion alone).
+    dashes, of a positional argument), ``bare`` (values are also taken without
+    the option), ``metavar``, ``repeat`` (repetitions of the option give a
+    tuple, else its several values), ``parse`` (makes the value of the text),
+    ``names`` (lists names for help and completion) and ``completes`` (lists
+    them for completion alone).
 
     Parameters
     ----------
@@ -101,8 +102,17 @@ def _add_option(
         action = argparse.BooleanOptionalAction if explicit or negative else "store_true"
         parser.add_argument(flag, action=action, **options)
         return
-    added = parser.add_argument(flag, **options, **_value_options(item, hint, flag))
-    added.completes = _completes(item, hint, known)  # type: ignore[attr-defined]
+    values = _value_options(item, hint, flag)
+    added = [parser.add_argument(flag, **options, **values)]
+    if item.metadata.get("bare"):
+        several = {
+            "nargs": "*" if get_origin(hint) is tuple else "?",
+            "help": f"The same as {flag}",
+        }
+        bare = {"default": argparse.SUPPRESS, **values, **several}
+        added.append(parser.add_argument(f"{prefix}{item.name}", **bare))
+    for action in added:
+        action.completes = _completes(item, hint, known)  # type: ignore[attr-defined]
 
 
 def _value_options(item: Field[Any], hint: Any, flag: str) -> dict[str, Any]:

@@ -32,7 +32,9 @@ class BenchmarkRequest(Checked):
     """
 
     repetitions: int = 7
-    policy: str = field(default="ars-tuned-both", metadata={"metavar": "NAME_OR_FILE"})
+    policy: str = field(
+        default="ars-tuned-both", metadata={"metavar": "NAME_OR_FILE", "bare": True}
+    )
     ppo: bool = False
     out: Path | None = field(default=None, metadata={"metavar": "DIR"})
     json: bool = False

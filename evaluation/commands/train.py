@@ -162,7 +162,7 @@ def _train(options: argparse.Namespace) -> None:
         _train_one(request)
         trained = str(request.out)
     name = shlex.quote(trained)
-    sys.stdout.write(f"next: kinarm-eval --policy {name}, kinarm-replay --policy {name}\n")
+    sys.stdout.write(f"next: kinarm-eval {name}, kinarm-replay {name}\n")
 
 
 def _train_one(request: TrainRequest) -> None:

@@ -3,10 +3,13 @@
 import webbrowser
 from collections import Counter
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field, fields
 from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING, ClassVar
+
+import numpy as np
 
 from kinarm._command_line import option_name
 from kinarm._console import working
@@ -32,6 +35,10 @@ NOT_FROM_FILE = (
 """Fields without meaning for the live page, and for trials from a file."""
 
 
+PAGE, GENERATOR = "replay.html", b'<meta name="generator" content="kinarm">'
+"""Default page, and what pages of kinarm begin with."""
+
+
 @dataclass(frozen=True, kw_only=True)
 class ReplayRequest(ProblemOptions):
     """Write one HTML file that replays trials offline, or show them live.
@@ -39,8 +46,8 @@ class ReplayRequest(ProblemOptions):
     Parameters
     ----------
     source : Path
-        File to take trials from: evaluation.json of kinarm-eval, or recordings
-        (.npz).
+        File to take trials from, evaluation.json of kinarm-eval or recordings
+        (.npz); or a policy, as for --policy.
     policy : str
         Shipped policy or recipe (its first seed), best, random, zero, oracle,
         .npz file, folder of them (the first), Stable-Baselines3's model.zip
@@ -75,7 +82,8 @@ class ReplayRequest(ProblemOptions):
     record : Path
         Write the recordings as well (.npz).
     overwrite : bool
-        Replace files that exist.
+        Replace files that exist; a page of kinarm with the default name always
+        is.
     live : bool
         Serve endless fresh trials to the browser of this machine instead of
         writing a page.
@@ -90,7 +98,10 @@ class ReplayRequest(ProblemOptions):
         If a number is out of range, or two fields do not go together.
     """
 
-    source: Path | None = field(default=None, metadata={"flag": "source", "metavar": "FILE"})
+    source: Path | None = field(
+        default=None,
+        metadata={"flag": "source", "metavar": "FILE", "completes": policy_choices},
+    )
     policy: str | None = field(
         default=None, metadata={"metavar": "NAME_OR_FILE", "completes": policy_choices}
     )
@@ -133,12 +144,15 @@ class ReplayRequest(ProblemOptions):
         "policy": "with --failures, best",
         "trials": "5; 200 to choose from, 10000 for --failures",
         "seed": "0",
-        "out": "replay.html",
+        "out": PAGE,
         "port": "7000, or the next free one",
     }
 
     def __post_init__(self) -> None:
         super().__post_init__()
+        if self.source and not (self.policy or self.compare) and is_policy(self.source):
+            object.__setattr__(self, "policy", str(self.source))
+            object.__setattr__(self, "source", None)
         for names in ALTERNATIVES:
             given = self._given(names)
             if len(given) > 1:
@@ -200,8 +214,9 @@ class ReplayRequest(ProblemOptions):
         from kinarm.recording import save_recordings
         from kinarm.viewer import replay_page
 
-        out = self.out or Path("replay.html")
-        check_output(out, overwrite=self.overwrite)
+        out = self.out or Path(PAGE)
+        own = self.out is None and out.is_file() and GENERATOR in out.read_bytes()[:2000]
+        check_output(out, overwrite=self.overwrite or own)
         if self.record is not None:
             check_output(self.record, overwrite=self.overwrite, suffix=".npz")
         with working("recording"):
@@ -248,6 +263,15 @@ class ReplayRequest(ProblemOptions):
                 webbrowser.open(server.address)
             for recording in follow(server, simulator, recordings):
                 report(described(recording))
+
+
+def is_policy(source: Path) -> bool:
+    """Whether it is no file of trials: a policy file, or what else names a policy."""
+    if source.suffix != ".npz":
+        return source.suffix != ".json"
+    with suppress(Exception), np.load(source, allow_pickle=False) as content:
+        return str(content["format"]) == "kinarm-policy"
+    return False
 
 
 def described(recording: "Recording") -> str:

@@ -36,6 +36,15 @@ def test_a_problem_without_policies_is_told(run):
     assert answer.out.splitlines()[-1] == "no shipped policy was trained for this"
 
 
+def test_policies_need_no_option(evaluated, policy_folder):
+    few = ("--problem", "right", "--trials", 2, "--no-oracle")
+    names = (policy_folder / "mine-seed0.npz", "zero")
+    expected = evaluated("--policy", *names, *few)["results"]
+    assert evaluated(*names, *few)["results"] == expected
+    assert evaluated(*few, *names)["results"] == expected
+    assert evaluated(names[0], *few, "--policy", names[1])["results"] == expected
+
+
 def test_matrix_is_every_policy_on_every_problem(evaluated, policy_folder):
     document = evaluated(
         *("--policy", policy_folder / "lefty.npz", "--policy", "zero", "--trials", 3, "--matrix")

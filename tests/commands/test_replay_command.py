@@ -129,6 +129,27 @@ def test_folders_are_made_and_files_kept(run, tmp_path):
     assert run("kinarm-replay", *options, *files, "--overwrite").status == 0
 
 
+def test_a_page_of_kinarm_with_the_default_name_is_replaced(run, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    options = ("zero", "--problem", "left", "--trials", 1, *QUICK)
+    for _ in range(2):
+        assert run("kinarm-replay", *options).status == 0
+    (tmp_path / "replay.html").rename(tmp_path / "mine.html")
+    check_refused(run("kinarm-replay", *options, "--out", "mine.html"), "--overwrite")
+    (tmp_path / "replay.html").write_text("<!DOCTYPE html>\n<title>kinarm, by me</title>\n")
+    check_refused(run("kinarm-replay", *options), "--overwrite")
+
+
+def test_a_policy_needs_no_option(run, replay, policy_folder, evaluation, tmp_path):
+    mine, few = policy_folder / "mine-seed0.npz", ("--trials", 1, *QUICK)
+    for number, words in enumerate([("--policy", mine, *few), (mine, *few), (*few, mine)]):
+        assert run("kinarm-replay", *words, "--out", tmp_path / f"{number}.html").status == 0
+    first, *others = (path.read_bytes() for path in tmp_path.glob("*.html"))
+    assert others == [first] * 2
+    check_refused(replay("bst"), "unknown policy 'bst' (did you mean 'best'?)")
+    check_refused(replay(mine, "--policy", "zero"), "'kinarm-policy', not 'kinarm-recording'")
+
+
 def test_recordings_of_another_arm(replay, recordings):
     check_refused(replay(recordings, "--arm", "paper_flange"), "'paper_flange' is another version")
 
@@ -152,10 +173,6 @@ def test_recordings_are_compared_in_the_same_trials_only(replay, recordings, tmp
     check_refused(replay(mixed, "--compare", "mine-seed0", "other"), "cannot be compared")
     save_recordings(mixed, [first, changed_to(first, policy="other")])
     assert played(replay(mixed, "--compare", "mine-seed0", "other")) == [0, 0]
-
-
-def test_policies_are_no_recordings(replay, policy_folder):
-    check_refused(replay(policy_folder / "lefty.npz"), "'kinarm-policy'", "'kinarm-recording'")
 
 
 def test_an_evaluation_that_no_longer_holds(replay, evaluation, tmp_path):
