@@ -111,8 +111,8 @@ def _add_option(
         }
         bare = {"default": argparse.SUPPRESS, **values, **several}
         added.append(parser.add_argument(f"{prefix}{item.name}", **bare))
-    for action in added:
-        action.completes = _completes(item, hint, known)  # type: ignore[attr-defined]
+    for argument in added:
+        argument.completes = _completes(item, hint, known)  # type: ignore[attr-defined]
 
 
 def _value_options(item: Field[Any], hint: Any, flag: str) -> dict[str, Any]:
