@@ -147,6 +147,9 @@ class Checked:
 
 def _value(hint: Any, entry: Any, where: str, path: str, kind: type) -> Any:
     """Convert a value to a type hint."""
+    if isinstance(entry, str) and not entry.isprintable():
+        where = f"{where}: " if where else ""
+        raise InvalidInputError(f"{where}{path} must be printable on a line, got {entry!r}")
     if hint is Any or (type(entry) is hint and hint is not float):
         return entry
     choices = alternatives(hint)

@@ -64,6 +64,21 @@ def test_states_where_the_policy_comes_from(card, skilled, document):
         assert line in card
 
 
+def test_names_in_policy_files_are_shown_and_not_interpreted(document, faced):
+    name = "<script>alert(1)</script>` | [a](b)"
+    made = faced[0].contestant.policy.provenance
+    forged = replace(made, algorithm=name, recipe=name, config={name: name}, versions={name: name})
+    contestant = replace(
+        faced[0].contestant, policy=replace(faced[0].contestant.policy, provenance=forged)
+    )
+    card = policy_card("mine", document, replace(faced[0], contestant=contestant))
+    shown = r"<script>alert(1)</script>' \| [a](b)"
+    assert f"| algorithm | `{shown}` |\n| recipe | `{shown}` |" in card
+    assert f"| `{shown}` | `{shown}` |" in card
+    # Within code, and the rows of tables, nothing of it is left.
+    assert "script" not in re.sub(r"`[^`\n]*`", "", card)
+
+
 def test_how_to_use_it_runs(card, document, faced, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     path = tmp_path / "mine.md"

@@ -81,6 +81,12 @@ class Bicycle(Checked):
     notes: dict[str, Any] = field(default_factory=dict)
 
 
+@pytest.mark.parametrize("character", ["\x1b", "\n", "\x9b", "\u202e"])
+def test_texts_have_no_control_characters(character):
+    with pytest.raises(InvalidInputError, match=r"bad.toml: .* must be printable on a line, got '"):
+        from_plain(Bicycle, {"name": f"a{character}b"}, "bad.toml")
+
+
 @pytest.mark.parametrize("sign", [1, -1])
 def test_numbers_are_at_most_a_million(sign):
     check_range("size", sign * 1e6, {})
@@ -92,7 +98,7 @@ wheels = st.builds(Wheel, radius=st.floats(1e-6, 1e6), spokes=st.integers(1, 2**
 numbers = st.floats(-1e6, 1e6)
 bicycles = st.builds(
     Bicycle,
-    name=st.text(),
+    name=st.text().filter(str.isprintable),
     wheels=st.lists(wheels, max_size=3).map(tuple),
     saddle=st.tuples(numbers, numbers),
     gears=st.lists(st.integers(1, 2**63 - 1)).map(tuple),
