@@ -78,7 +78,6 @@ FURNITURE = {
 }
 WRITTEN = {
     "my_problem.toml": 'base = "left"',
-    "my_recipe.toml": 'base = "tuned"',
     "steps.toml": 'problems = ["right"]\nseeds = 1\n[trials]\ncount = 4\n[fixed]\niterations = 1',
 }
 """What the reader of a page has at hand: copies of files, and files of some lines."""
