@@ -262,14 +262,6 @@ def _moved(text: str, source: Path, folder: Path) -> str:
     )
 
 
-def main() -> None:
-    """Write what has changed into the pages."""
-    for page in sorted(DOCS.glob("**/*.md")):
-        text = filled(page)
-        if text != page.read_text("utf-8"):
-            page.write_text(text, "utf-8")
-            print(page)
-
-
 if __name__ == "__main__":
-    main()
+    for each in DOCS.glob("*/*.md"):
+        each.write_text(filled(each), "utf-8")

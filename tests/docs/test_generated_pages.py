@@ -6,6 +6,7 @@ from types import ModuleType
 import pytest
 from pages import DOCS, pages
 
+from docs import tables
 from kinarm.evaluation.metrics import METRICS
 
 PAGES = {name: path for name, path in pages().items() if "<!-- end -->" in path.read_text()}
@@ -34,8 +35,7 @@ def test_every_program_and_option_is_described(monkeypatch: pytest.MonkeyPatch) 
         assert [each for each in options if each not in text] == []
 
 
-def test_every_figure_is_defined(monkeypatch: pytest.MonkeyPatch) -> None:
-    tables = module(monkeypatch, "tables")
+def test_every_figure_is_defined() -> None:
     table = tables.metrics_table()
     assert [name for name in METRICS if f"| `{name}` |" not in table] == []
     assert [
@@ -44,6 +44,5 @@ def test_every_figure_is_defined(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.mark.parametrize("name", PAGES)
-def test_a_page_holds_what_would_be_written_now(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    tables = module(monkeypatch, "tables")
+def test_a_page_holds_what_would_be_written_now(name: str) -> None:
     assert tables.filled(PAGES[name]) == PAGES[name].read_text()

@@ -1,4 +1,4 @@
-"""The directive that runs the code of pages in the build."""
+"""What the build makes of pages: comments become directives, and code runs."""
 
 import sys
 from pathlib import Path
@@ -6,7 +6,46 @@ from types import ModuleType
 
 import pytest
 
+from docs.comments import for_site
+
 DOCS = Path(__file__).resolve().parents[2] / "docs"
+
+PAGE = """\
+`kinarm.Scene` [`kinarm.World`](a.md) `kinarm-eval` [b](../examples/plot_b.py)
+[c](examples)
+<!-- run shows=a.png -->
+```python
+`kinarm.Scene`
+```
+<!-- name metric -->
+```toml
+# a.toml
+```
+<!-- {toctree}
+:hidden:
+-->
+<!-- table arm -->
+"""
+BUILT = """\
+{py:obj}`kinarm.Scene` [`kinarm.World`](a.md) `kinarm-eval` [b](../gallery/plot_b)
+[c](gallery/index)
+
+```{kinarm-run} python shows=a.png
+`kinarm.Scene`
+```
+
+```{kinarm-run} toml
+# a.toml
+```
+```{toctree}
+:hidden:
+```
+<!-- table arm -->
+"""
+
+
+def test_comments_become_directives_and_names_links_in_their_lines():
+    assert for_site(PAGE) == BUILT
 
 
 @pytest.fixture
