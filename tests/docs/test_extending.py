@@ -230,7 +230,7 @@ def test_an_observation_part_is_a_formula_and_an_entry(folder: Path) -> None:
     formula, entry = BLOCKS["observation-formula"], BLOCKS["observation-entry"]
     text = text.replace("\nPOLAR = ", f"\n{formula}\n\nPOLAR = ", 1)
     head, tail = text.split(')\n"""The parts in order', 1)
-    source.write_text(f'{head}{entry})\n"""The parts in order{tail}')
+    source.write_text(f'{head}{entry},)\n"""The parts in order{tail}')
     subprocess.run(
         [sys.executable, "-c", ADDED_PART],
         check=True,
