@@ -1,5 +1,6 @@
 from .bounds import oracle_bounds as oracle_bounds
 from .contestants import Contestant as Contestant
+from .curves import LearningCurves as LearningCurves
 from .document import EvaluationDocument as EvaluationDocument
 from .evaluation import Evaluation as Evaluation
 from .evaluation import PooledEvaluation as PooledEvaluation

@@ -12,10 +12,11 @@ from numpy.typing import NDArray
 
 from kinarm._files import write_atomically, write_text
 from kinarm._tables import csv_text
+from kinarm.evaluation.curves import Band
 from kinarm.evaluation.experiments import table
 from kinarm.evaluation.experiments.plan import Run
 from kinarm.evaluation.experiments.table import Group, identity, shorter, shown
-from kinarm.evaluation.figures import COLOURS, DASHES, panels_figure, save_figure
+from kinarm.evaluation.figures import COLOURS, panels_figure, save_figure
 from kinarm.evaluation.metrics import METRICS
 from kinarm.evaluation.report.templating import markdown_table, template_environment
 from kinarm.evaluation.statistics import Estimate, share_over_seeds
@@ -157,8 +158,8 @@ def _by_problem(study: "Study") -> dict[str, list[Group]]:
 def learning_curves(study: "Study") -> "Figure | None":
     """Success during the training, against environment steps and wall time.
 
-    A row per problem; lines are means over the seeds, bands are their ranges, and dotted is what
-    the oracle reaches. None without curves.
+    A row per problem; lines are means over the seeds, bands their 95 % intervals, and dotted is
+    what the oracle reaches. None without curves.
     """
     from matplotlib.ticker import NullFormatter
 
@@ -185,23 +186,16 @@ def learning_curves(study: "Study") -> "Figure | None":
 
 
 def _draw_curves(panels: "Sequence[Axes]", group: Group, number: int) -> None:
-    """Draw the mean and the band of the seeds, against steps and seconds."""
+    """Draw the mean of the seeds and its interval, against steps and seconds."""
     seeds = [
         np.array([(point.environment_steps, seconds, point.success) for point, seconds, _ in curve])
         for curve in (run.timed_curve for run in group.runs)
     ]
-    colour, dash = COLOURS[number % len(COLOURS)], DASHES[number // len(COLOURS) % len(DASHES)]
     for column, axes in enumerate(panels):
-        curves = [(seed[:, column], seed[:, 2]) for seed in seeds]
-        curves = [(x, y) for x, y in curves if np.isfinite(x).all() and x[-1] > 0]
-        if curves:
-            first = max(max(x[0] for x, _ in curves), 1e-3)
-            places = np.geomspace(first, max(first, min(x[-1] for x, _ in curves)), 200)
-            heights = np.array([np.interp(places, x, y) for x, y in curves])
-            low, high = heights.min(axis=0), heights.max(axis=0)
-            axes.fill_between(places, low, high, color=colour, alpha=0.15, lw=0)
-            mean = heights.mean(axis=0)
-            axes.plot(places, mean, color=colour, linestyle=dash, lw=2, label=group.label)
+        begun = [seed[~(seed[:, column] <= 0)] for seed in seeds]
+        curves = [(seed[:, column], seed[:, 2]) for seed in begun if len(seed)]
+        if curves := [(x, y) for x, y in curves if np.isfinite(x).all()]:
+            Band.of(curves).draw(axes, group.label, number)
 
 
 def effects(study: "Study") -> "Figure | None":
