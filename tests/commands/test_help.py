@@ -69,6 +69,7 @@ TRAINING = (
         ("kinarm-arms list", ""),
         ("kinarm-arms show", "--tool-frame"),
         ("kinarm-study status", ""),
+        ("kinarm-study curves", "--measure --out --overwrite"),
         ("kinarm-train ars", f"{TRAINING} --sharing --step-size --no-normalize"),
         ("kinarm-train ppo", f"{TRAINING} --n-envs --net-arch --learning-rate --tensorboard"),
         *((program, "--version") for program in PROGRAMS),
