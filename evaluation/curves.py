@@ -149,53 +149,48 @@ def _trainings(name: str) -> list[tuple[str, list[Path]]]:
 
 def _read(files: Sequence[Path]) -> dict[str, Points]:
     """Steps, returns and perhaps successes of a training, shape (n_points,)."""
-    name = repr(str(files[0]))
-    for kind, read in READERS.items():
-        if files[0].match(kind):
-            with reading(name, "learning curve", InvalidInputError, of="readable"):
-                known = read(files)
-                return {
-                    each: values[np.isfinite(known["return"])] for each, values in known.items()
-                }
-    raise InvalidInputError(f"{name} is no learning curve: {', '.join(READERS)}")
+    name, kinds = repr(str(files[0])), [kind for kind in READERS if files[0].match(kind)]
+    if not kinds:
+        raise InvalidInputError(f"{name} is no learning curve: {', '.join(READERS)}")
+    with reading(name, "learning curve", InvalidInputError, of="file with a"):
+        told = READERS[kinds[0]](files)
+        if not (known := np.isfinite(told["return"])).any():
+            raise ValueError("it holds no point")
+        return {each: values[known] for each, values in told.items()}
 
 
 def _read_own(files: Sequence[Path]) -> dict[str, Points]:
-    rows = csv.DictReader(files[0].read_text(encoding="utf-8").splitlines())
-    columns = {"steps": "environment_steps", "success": "success", "return": "mean_return"}
-    return _columns([{name: float(row[key]) for name, key in columns.items()} for row in rows])
+    rows = list(csv.DictReader(files[0].read_text(encoding="utf-8").splitlines()))
+    names = {"steps": "environment_steps", "success": "success", "return": "mean_return"}
+    return {each: np.array([float(row[name]) for row in rows]) for each, name in names.items()}
 
 
 def _read_evaluations(files: Sequence[Path]) -> dict[str, Points]:
     """Means over the episodes of each evaluation."""
     with np.load(files[0], allow_pickle=False) as content:
-        names = {"success": "successes", "return": "results"}
-        told = {name: content[key].mean(axis=1) for name, key in names.items() if key in content}
-        return {"steps": content["timesteps"].astype(float), **told}
+        names = {"steps": "timesteps", "success": "successes", "return": "results"}
+        told = {each: content[name] for each, name in names.items() if name in content}
+    return {each: values.reshape(len(values), -1).mean(axis=1) for each, values in told.items()}
 
 
 def _read_monitors(files: Sequence[Path]) -> dict[str, Points]:
     """Moving averages over the episodes of all environments, in the order of their ends."""
-    episodes: list[tuple[float, dict[str, float]]] = []
+    episodes: list[tuple[float, dict[str, str]]] = []
     for file in files:
         header, *lines = file.read_text(encoding="utf-8").splitlines()
         start = float(json.loads(header.removeprefix("#"))["t_start"])
-        for row in csv.DictReader(lines):
-            told = {"steps": float(row["l"]), "return": float(row["r"])}
-            if "is_success" in row:
-                told["success"] = float(row["is_success"] in ("True", "1", "1.0"))
-            episodes.append((start + float(row["t"]), told))
-    known = _columns([told for _, told in sorted(episodes, key=itemgetter(0))])
-    window = min(WINDOW, -(-len(episodes) // 10))
-    means = {
-        name: np.convolve(values, np.full(window, 1 / window), "valid")
-        for name, values in known.items()
+        episodes += [(start + float(row["t"]), row) for row in csv.DictReader(lines)]
+    rows = [row for _, row in sorted(episodes, key=itemgetter(0))]
+    told = {"return": [float(row["r"]) for row in rows]}
+    if all("is_success" in row for row in rows):
+        told["success"] = [float(row["is_success"] in ("True", "1", "1.0")) for row in rows]
+    window = min(WINDOW, -(-len(rows) // 10))
+    steps = np.cumsum([float(row["l"]) for row in rows])[window - 1 :]
+    share = np.full(window, 1 / window)
+    return {
+        "steps": steps,
+        **{name: np.convolve(each, share, "valid") for name, each in told.items()},
     }
-    return {**means, "steps": np.cumsum(known["steps"])[window - 1 :]}
-
-
-def _columns(rows: Sequence[Mapping[str, float]]) -> dict[str, Points]:
-    return {name: np.array([row[name] for row in rows]) for name in rows[0]}
 
 
 OWN, MONITOR = "*.curve.csv", "*monitor.csv"

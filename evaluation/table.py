@@ -78,7 +78,6 @@ def all_columns() -> list[Column[Row]]:
     columns: list[Column[Row]] = [
         Column("problem", attrgetter("problem"), priority=ALWAYS, words=True),
         Column("policy", policy_label, priority=ALWAYS, words=True),
-        *map(_fact_column, ("algorithm", "recipe", "trained_on", "trials")),
     ]
     for name, metric in METRICS.items():
         columns.append(metric_column(name, attrgetter("metrics")))
@@ -87,11 +86,6 @@ def all_columns() -> list[Column[Row]]:
         if metric.spread_heading:
             columns.append(spread_column(name))
     return columns
-
-
-def _fact_column(name: str) -> Column[Row]:
-    """A column of how a row was made."""
-    return Column(name, lambda row: getattr(row, name) or "", priority=ON_REQUEST, words=True)
 
 
 def _seeds_column() -> Column[Row]:

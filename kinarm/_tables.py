@@ -172,7 +172,7 @@ def print_columns(
     console: "Console",
     *,
     whole: bool = False,
-    advice: str = "a wider terminal shows them",
+    advice: str = "a wider terminal, or COLUMNS=250, shows them",
 ) -> None:
     """Print a table: headings and words wrap; columns without room are left out and named.
 

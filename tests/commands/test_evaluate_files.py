@@ -73,7 +73,7 @@ class TestCsv:
         with (tmp_path / "a.csv").open() as file:
             (row,) = csv.DictReader(file)
         (result,) = json.loads((tmp_path / "evaluation.json").read_text())["results"]
-        assert (row["policy"], row["trials"]) == ("mine-seed0", "8")
+        assert (row["problem"], row["policy"]) == ("right", "mine-seed0")
         for name, metric in result["metrics"].items():
             value = metric["value"]
             assert row[name] == ("" if value is None else repr(value))
