@@ -1,5 +1,6 @@
 """Evaluations: their figures against the episodes, and the episodes against the reference path."""
 
+import pickle
 import subprocess
 import sys
 from dataclasses import replace
@@ -56,6 +57,12 @@ def test_figures_are_those_of_the_episodes(skilled_evaluation):
     assert figures["mean_distance"] == pytest.approx(sum(distance) / 60)
     assert figures["max_distance"] == max(distance)
     assert figures["mean_steps"] == pytest.approx(sum(skilled_evaluation.rollouts.steps) / 60)
+
+
+def test_it_can_be_pickled_for_other_processes(skilled_evaluation):
+    copy = pickle.loads(pickle.dumps(skilled_evaluation))
+    assert copy.metrics == skilled_evaluation.metrics
+    np.testing.assert_array_equal(copy.rollouts.distance, skilled_evaluation.rollouts.distance)
 
 
 def test_the_still_baseline_never_moves():
