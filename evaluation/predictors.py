@@ -10,6 +10,7 @@ import numpy as np
 from gymnasium.spaces import Box
 from numpy.typing import ArrayLike, NDArray
 
+from kinarm._parallel import one_torch_thread
 from kinarm.envs import ReachEnv
 from kinarm.episodes import RUNNING, Episodes, Rollouts, StepResult
 from kinarm.evaluation.trials import TrialSet
@@ -106,6 +107,7 @@ def run_remembering(actor: Actor, trials: TrialSet, *, record: bool = False) -> 
     return trials.simulator.rollout(actions, trials.starts, trials.goals, record=record)
 
 
+@one_torch_thread()
 def run_wrapped(
     actor: Actor, wrapper: Wrapper, trials: TrialSet, *, record: bool = False
 ) -> Rollouts:

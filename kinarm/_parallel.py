@@ -1,8 +1,10 @@
-"""Kernels over the rows of a batch on several threads."""
+"""Threads: kernels over the rows of a batch on several, and torch on one."""
 
 import os
-from collections.abc import Callable
+import sys
+from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
 from functools import cache
 from threading import current_thread, main_thread
 from typing import Any
@@ -96,3 +98,21 @@ def run_together(
 def thread_pool(process: int, threads: int) -> ThreadPoolExecutor:
     """A pool per process, since a fork loses threads."""
     return ThreadPoolExecutor(threads, thread_name_prefix=f"kinarm-{process}")
+
+
+@contextmanager
+def one_torch_thread() -> Iterator[None]:
+    """Keep torch, if it is loaded, to one thread.
+
+    Several are slower for small networks, and their sums depend on their number.
+    """
+    torch = sys.modules.get("torch")
+    if torch is None:
+        yield
+        return
+    threads = torch.get_num_threads()
+    torch.set_num_threads(1)
+    try:
+        yield
+    finally:
+        torch.set_num_threads(threads)

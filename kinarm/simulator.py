@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from kinarm._parallel import run_together
+from kinarm._parallel import one_torch_thread, run_together
 from kinarm.arm import Arm
 from kinarm.chain import within_limits
 from kinarm.episodes import PAUSED, RUNNING, Control, Episodes, Rollouts, StepResult
@@ -327,6 +327,7 @@ class Simulator:
             episodes.touched[paused[touched < 0]] = 0
         return resumed
 
+    @one_torch_thread()
     def _follow(self, policy: PolicyFunction, episodes: Episodes) -> None:
         """Drive episodes to their end with a Python function."""
         numbered = takes_rows(policy)

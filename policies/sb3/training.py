@@ -23,6 +23,7 @@ from stable_baselines3.common.vec_env import VecEnv, VecNormalize
 
 from kinarm._console import doing
 from kinarm._files import first_line
+from kinarm._parallel import one_torch_thread
 from kinarm.errors import InvalidInputError
 from kinarm.policies.learners import CurvePoint
 from kinarm.policies.policy import Policy
@@ -41,13 +42,11 @@ REFUSALS = (AssertionError, AttributeError, KeyError, RuntimeError, TypeError, V
 @contextmanager
 def alone_in_torch() -> Iterator[None]:
     """Keep torch to one thread, and restore global generators afterwards."""
-    threads, numpy_state = torch.get_num_threads(), np.random.get_state()  # noqa: NPY002
-    with torch.random.fork_rng(devices=[]):
-        torch.set_num_threads(1)
+    numpy_state = np.random.get_state()  # noqa: NPY002
+    with torch.random.fork_rng(devices=[]), one_torch_thread():
         try:
             yield
         finally:
-            torch.set_num_threads(threads)
             np.random.set_state(numpy_state)  # noqa: NPY002
 
 

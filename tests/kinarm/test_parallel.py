@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from kinarm._parallel import run_rows, run_together
+from kinarm.simulator import Simulator
 
 
 @pytest.mark.parametrize("n", [1, 7, 1000])
@@ -94,3 +95,21 @@ class TestTogether:
         finally:
             free.set()
             others.join()
+
+
+def test_functions_have_torch_to_one_thread_of_it():
+    torch = pytest.importorskip("torch")
+    before, seen = torch.get_num_threads(), []
+    torch.set_num_threads(3)
+    try:
+        simulator = Simulator("right")
+        starts, goals = simulator.sample(np.random.default_rng(0), 2)
+
+        def policy(observations):
+            seen.append(torch.get_num_threads())
+            return np.zeros((len(observations), simulator.n_actions))
+
+        simulator.rollout(policy, starts, goals)
+        assert (set(seen), torch.get_num_threads()) == ({1}, 3)
+    finally:
+        torch.set_num_threads(before)
