@@ -8,6 +8,7 @@ import base64
 import contextlib
 import io
 import os
+import re
 import subprocess
 import sys
 from contextlib import suppress
@@ -27,8 +28,8 @@ from kinarm.viewer.pages import HtmlPage
 TERMINAL = {"COLUMNS": "92", "LINES": "40", "TERM": "dumb"}
 """The terminal in which commands run, for programs that ask."""
 
-DRAWN = frozenset("│|")
-"""What tables are drawn with, whose lines must not wrap."""
+COLUMNS = re.compile(r"[│|]|\S {2,}\S")
+"""What there is between columns of tables, whose lines must not wrap."""
 
 KINDS = {".mp4": "video/mp4", ".png": "image/png", ".gif": "image/gif"}
 """Files that can be shown, by their ending."""
@@ -143,7 +144,7 @@ class KinarmRun(SphinxDirective):
         else:
             printed = page.run_commands(code, line, fails="fails" in options)
         if printed.strip():
-            kinds = ["printed"] if DRAWN.intersection(printed) else ["printed", "wraps"]
+            kinds = ["printed"] if COLUMNS.search(printed) else ["printed", "wraps"]
             found.append(nodes.literal_block(printed, printed, language="text", classes=kinds))
         if made := options.get("shows"):
             found.append(nodes.raw("", shown(made, page.read(made)), format="html"))
