@@ -2,10 +2,12 @@
 
 import os
 from collections.abc import Callable, Iterator, Sequence
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 import pytest
+from hanging_chain import hanging_chain
 from hypothesis import settings
 
 from kinarm.arm import Arm
@@ -190,6 +192,11 @@ def write_robot(tmp_path_factory: pytest.TempPathFactory) -> Callable[..., Path]
         return path
 
     return write
+
+
+@pytest.fixture(scope="session")
+def hanging(write_robot: Callable[..., Path]) -> Callable[..., Simulator]:
+    return partial(hanging_chain, joint, collision, write_robot)
 
 
 @pytest.fixture(scope="session")

@@ -55,8 +55,12 @@ def walled(make_joint, make_collision, write_robot):
 def planar_goals(rng, count, nearest=0.0, farthest=INNER + OUTER, height=0.0):
     """Goals in a ring, at most so far from the plane."""
     angle, radius = rng.uniform(-np.pi, np.pi, count), rng.uniform(nearest, farthest, count)
-    z = HEIGHT + height * rng.uniform(-1, 1, count)
-    return np.stack([radius * np.cos(angle), radius * np.sin(angle), z], axis=1)
+    return goals_at(radius * np.exp(1j * angle), height * rng.uniform(-1, 1, count))
+
+
+def goals_at(points, above=0.0):
+    """Goals at complex numbers, in the plane or above it."""
+    return np.stack([points.real, points.imag, HEIGHT + above + 0 * points.real], axis=1)
 
 
 def ring_distance(goals):
@@ -109,7 +113,7 @@ class TestPlanarDistance:
         exact = ring_distance(goals)
         assert (proven <= exact + 1e-12).all()
         assert (exact <= found + 1e-12).all()
-        assert (found - proven <= resolution + 1e-8).all()
+        assert (found - proven <= resolution + 1e-15).all()
 
     def test_boxes(self, planar):
         rng = np.random.default_rng(5)
@@ -125,14 +129,18 @@ class TestPlanarDistance:
             assert found[i] >= least - error
         assert (found - proven < 1.1e-3).all()
 
-    def test_box_of_no_extent(self, planar):
-        configuration, goals = np.array([[0.3, -1.2]]), np.array([[0.1, 0.2, 0.3]])
+    def test_boxes_of_no_extent(self, planar):
+        rng = np.random.default_rng(9)
+        corners, goals = rng.uniform(-3.3, 3.3, (200, 2)), rng.uniform(-1, 1, (200, 3))
         proven, found, at = prove_distance(
-            planar, np.zeros((1, 2)), goals, (configuration, configuration)
+            planar, np.zeros((200, 2)), goals, (corners.copy(), corners.copy())
         )
-        exact = np.linalg.norm(planar.arm.tool_position(configuration[0]) - goals[0])
-        np.testing.assert_allclose([proven[0], found[0]], exact, atol=1e-8)
-        np.testing.assert_array_equal(at, configuration)
+        tools = np.array([planar.arm.tool_position(q) for q in corners])
+        exact = np.linalg.norm(tools - goals, axis=1)
+        # The proven one leaves room for rounding.
+        assert (proven <= exact).all()
+        np.testing.assert_allclose([proven, found], [exact, exact], atol=2e-9)
+        np.testing.assert_array_equal(at, corners)
 
 
 def planar_steps(start, goal):
@@ -173,6 +181,34 @@ class TestPlanarSteps:
         assert (moved[found] <= floors[found] + 1e-6).all()
         tools = np.array([planar.arm.tool_position(q) for q in witnesses])
         assert (np.linalg.norm(tools - goals, axis=1)[found] <= TOLERANCE).all()
+
+    def test_goals_that_full_steps_just_reach_are_decided(self, planar):
+        rng = np.random.default_rng(10)
+        starts, steps = rng.uniform(-3, 3, (1000, 2)), rng.integers(1, 6, 1000)
+        sides, ends = rng.choice([-1, 1], (1000, 2)), starts.copy()
+        for k in range(5):
+            ends += np.where(k < steps[:, None], sides * planar.step_limit, 0)
+        towards = np.exp(1j * rng.uniform(-np.pi, np.pi, 1000))
+        goals = goals_at(planar_tools(*ends.T) + TOLERANCE * towards)
+        # Either axis comes closer only beyond its last step.
+        speeds = [1j * planar_tools(*ends.T), 1j * OUTER * np.exp(1j * ends.sum(axis=1))]
+        nearer = sides.T * np.real(np.conj(towards) * speeds)
+        kept = (nearer > 0.1).all(axis=0) & (planar.world.distances(ends, goals) <= TOLERANCE)
+        floors, tight, _ = prove_steps(planar, starts[kept], goals[kept])
+        assert kept.sum() > 50
+        assert tight.all()
+        np.testing.assert_array_equal(floors, steps[kept])
+
+    def test_goals_that_a_stretched_arm_just_reaches_are_not_ruled_out(self, planar):
+        rng = np.random.default_rng(11)
+        ends = np.stack([rng.uniform(-3, 3, 400), np.zeros(400)], axis=1)
+        goals = goals_at((INNER + OUTER + TOLERANCE) * np.exp(1j * ends[:, 0]))
+        starts = ends + rng.uniform(-0.3, 0.3, (400, 2))
+        kept = planar.world.distances(ends, goals) <= TOLERANCE
+        floors, _, _ = prove_steps(planar, starts[kept], goals[kept])
+        steps = np.ceil(np.abs(ends - starts).max(axis=1) / 0.06)
+        assert kept.sum() > 50
+        np.testing.assert_array_equal(floors, steps[kept])
 
     def test_unreachable_goals(self, planar):
         starts = np.random.default_rng(7).uniform(-3.3, 3.3, (20, 2))

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from configurations import random_configurations
+from hanging_chain import LENGTHS, tips
 from numba import njit
 from proofs import within
 
@@ -132,6 +133,45 @@ class TestBounds:
                 lost.append(distances(simulator, drawn, goal).min() - results[1])
             assert lost[0] < 2e-4
             assert lost[1] < 2e-6
+
+    def test_what_is_of_third_order_is_attained(self, hanging):
+        simulator, rng, centre = hanging(), np.random.default_rng(8), np.array([2.0, 0, 0, 0])
+        # All axes move the tool towards a goal beside it, or away.
+        goal, reaches = np.array([1.0, 0, 2 - LENGTHS.sum()]), np.cumsum(LENGTHS[::-1])[::-1]
+        for half in rng.uniform(0.01, 0.05, (60, 4)) * rng.integers(0, 2, (60, 4)) * [0, 1, 1, 1]:
+            bound = examined(simulator, centre, half, goal, np.inf)[0][1]
+            first, second = reaches @ half[1:], np.square(np.cumsum(half[1:])) @ LENGTHS / 2
+            beyond = np.linalg.norm(tips(centre + half) - tips(centre) - [-first, second])
+            assert beyond <= 1.0 - first - bound + 1e-15
+            assert beyond >= 0.99 * (1.0 - first - bound) - 1e-15
+
+    @pytest.mark.parametrize("joint", [1, 2, 3])
+    def test_a_closest_configuration_within_a_box_is_attained(self, hanging, joint):
+        # The goal is below a chain that hangs down at nine tenths of a half-width.
+        half = 0.02 * (np.arange(4) == joint)
+        goal, centre = np.array([0, 0, -8 - LENGTHS.sum()]), [2.0, 0, 0, 0] - 0.9 * half
+        bound = examined(hanging(), centre, half, goal, np.inf)[0][1]
+        assert 10 - 2.5e-6 < bound <= 10
+
+    @pytest.mark.parametrize("half", [(0, 1e-3, 0, 0), (0, 0, 1e-3, 0), (0, 1e-3, 1e-3, 0)])
+    def test_the_bound_by_joints_is_attained(self, hanging, half):
+        # The last link points to the goal, and the axes move its origin there.
+        centre, goal = np.array([2, 0, 0, np.pi / 2]), np.array([-1, 0, 2 - LENGTHS[:2].sum()])
+        bound = examined(hanging(), centre, np.array(half), goal, np.inf)[0][2]
+        least = np.linalg.norm(tips(centre + half) - goal[[0, 2]])
+        assert least - 1e-5 < bound <= least
+
+    def test_no_configuration_as_close_as_the_cutoff_is_cut_off(self, any_simulator):
+        simulator, rng, n = any_simulator, np.random.default_rng(9), any_simulator.n_actions
+        for centre, _, goal in zip(*drawn_boxes(simulator, 10, 200), strict=True):
+            joint = rng.integers(0, n)
+            half = 0.01 * (np.arange(n) == joint)
+            for side in (-0.99, 0.99):
+                q = centre.copy()
+                q[joint] += side * half[joint]
+                cutoff = distances(simulator, q[None], goal + 10)[0]
+                _, lower, upper = examined(simulator, centre, half, goal + 10, cutoff)
+                assert lower[joint] - 1e-12 <= q[joint] <= upper[joint] + 1e-12
 
     def test_what_is_cut_off_is_beyond_the_cutoff(self, any_simulator):
         simulator, rng, cut = any_simulator, np.random.default_rng(5), 0

@@ -4,14 +4,13 @@ import numpy as np
 import pinocchio as pin
 import pytest
 from configurations import contact_boundary, depths, random_configurations
+from hanging_chain import BASE, LENGTHS, RADIUS, SLAB, tips
 from numba import njit
 
-from kinarm.arm import Arm
 from kinarm.kernels.kinematics import POSE, forward_kinematics
+from kinarm.kernels.proof import DEPTH
 from kinarm.policies.oracle.kernels.box_proofs import overlaps
-from kinarm.problem import PROBLEMS
-from kinarm.scene import PAPER_BENCHES, Obstacle, Scene
-from kinarm.simulator import Simulator
+from kinarm.scene import Obstacle
 
 CAPSULE_ARMS = ("lrmate200ic_5l", "paper", "paper_flange")
 
@@ -135,25 +134,31 @@ class TestShapes:
         assert simulator.world.contact_model.shapes.exact.sum() == 2
         assert claims(simulator, random_configurations(simulator, 8, 20_000)).sum() > 20
 
-    def test_by_hand(self, make_joint, make_collision, write_robot):
-        # A ball of 0.1 m that turns at a distance of 0.5 m from a vertical axis, at z = 0.4.
-        ball = make_collision('<sphere radius="0.1"/>', xyz="0.5 0 0")
-        arm = Arm.load(write_robot([make_joint(xyz="0 0 0.4"), make_joint()], {2: ball}))
-        wall = Obstacle(name="wall", lower=(0.55, -1.0, 0.0), upper=(1.0, 1.0, 1.0))
-        scene = Scene(obstacles=(wall, *PAPER_BENCHES))
-        simulator = Simulator(PROBLEMS["both"].replace(arm=arm, scene=scene), threads=1)
-        turns = np.array([0.0, 0.3, 0.4, 0.5, 0.6, 1.0])
-        configurations = np.stack([turns, 0 * turns], axis=1)
-        # The ball reaches the wall as long as 0.5 cos q + 0.1 > 0.55, that is q < 0.451.
-        expected = [True, True, True, False, False, False]
-        np.testing.assert_array_equal(claims(simulator, configurations), expected)
-        # It stays in the wall for q up to 0.4, which a box about 0 can reach with its first axis.
-        for half, claimed in ((0.2, True), (0.46, False)):
-            halves = np.array([[half, 0.0]])
-            assert claims(simulator, np.zeros((1, 2)), halves)[0] == claimed
-
 
 class TestBoxes:
+    @pytest.mark.parametrize("obstacles", [(), (SLAB,)], ids=["ground", "slab"])
+    def test_are_claimed_as_long_as_they_cannot_rise(self, hanging, obstacles):
+        simulator = hanging(*obstacles)
+        halves = np.random.default_rng(16).uniform(0.01, 0.05, (200, 4)) * [0.1, 1, 1, 1]
+        halves[::2, 0], halves[0] = 0.0, 0.0
+        rise = tips(halves)[:, 1] + LENGTHS.sum()
+        centres, level = np.zeros((200, 4)), SLAB.upper[2] * len(obstacles)
+        for share, claimed in ((0.99, False), (1.01, True)):
+            centres[:, 0] = level + RADIUS + LENGTHS.sum() - share * (rise + DEPTH)
+            np.testing.assert_array_equal(claims(simulator, centres, halves), claimed)
+
+    @pytest.mark.parametrize("yaw", [None, 0.0, np.pi / 2])
+    def test_are_claimed_as_long_as_they_cannot_leave_sideways(self, hanging, yaw):
+        # The tool's ball overlaps that of the base, and a wall as far away, in the same depth.
+        (x, y, z), depth = BASE, 2 * RADIUS - BASE[0]
+        box = {"lower": (x - RADIUS, y - 1, z - 1), "upper": (x - RADIUS + 2, y + 1, z + 1)}
+        simulator = hanging(*([] if yaw is None else [Obstacle(name="wall", yaw=yaw, **box)]))
+        halves = np.random.default_rng(17).uniform(0.001, 0.01, (200, 4)) * [0, 1, 1, 1]
+        halves *= (depth / np.abs(tips(halves)[:, 0]))[:, None]
+        centres = np.tile([z + LENGTHS.sum(), 0, 0, 0], (200, 1))
+        for share, claimed in ((0.98, True), (1.02, False)):
+            np.testing.assert_array_equal(claims(simulator, centres, halves, share), claimed)
+
     def test_every_configuration_of_a_claimed_box_touches_something(self, any_simulator):
         centres, halves = boxes(any_simulator, 9, 60_000)
         claimed = np.flatnonzero(claims(any_simulator, centres, halves))

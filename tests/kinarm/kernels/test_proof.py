@@ -1,0 +1,97 @@
+"""Proofs of steps, held against steps that attain their bounds."""
+
+import numpy as np
+import pytest
+from hanging_chain import LENGTHS, RADIUS, SLAB, tips
+from numba import njit
+
+from kinarm.kernels.kinematics import forward_kinematics
+from kinarm.kernels.lanes import LANES, as_numbers
+from kinarm.kernels.planes import EVERYDAY, GAP, height_above, propose
+from kinarm.kernels.proof import (
+    DEPTH,
+    MARGIN,
+    first_contact,
+    prove_alone,
+    prove_step,
+    renew_planes,
+)
+from kinarm.kernels.session import put, work_space
+
+
+@njit
+def prove(chain, shapes, tested, starts, targets, block, alone, bounds, found):
+    for i in range(len(starts)):
+        for lane in range(LANES):
+            put(starts, i, block.q, 0, lane)
+            put(targets, i, block.target, 0, lane)
+        forward_kinematics(chain, block.q, 0, block.before)
+        forward_kinematics(chain, block.target, 0, block.after)
+        for pair in range(len(shapes.planes)):
+            propose(shapes, pair, block.before, block.planes, pair)
+            height = height_above(shapes, pair, EVERYDAY, block.before, block.planes, pair)
+            block.planes[pair, GAP] = height
+        first = prove_step(shapes, tested, block.after, block)
+        second = renew_planes(shapes, tested, first < 1.0, block.before, block.after, block)
+        block.distance[0], block.total[0] = first, second
+        bounds[0, i] = as_numbers(block.distance)[0, 0]
+        bounds[1, i] = as_numbers(block.total)[0, 0]
+        doubt = prove_alone(0, chain, shapes, tested, block.after, block, alone)
+        found[0, i] = doubt
+        if doubt != 0:
+            found[1, i] = first_contact(0, doubt, chain, shapes, tested, block, alone)
+
+
+def proofs(simulator, tested, starts, targets):
+    """Bounds of the least height in steps, by old and by new planes; doubt, and what touches."""
+    chain, shapes, _ = simulator.world.records
+    n = simulator.arm.n_joints
+    space = work_space(n_joints=n, n_actuated=n, n_pairs=len(shapes.planes))
+    bounds, found = np.zeros((2, len(starts))), np.zeros((2, len(starts)), dtype=np.int64)
+    prove(chain, shapes, tested, starts, targets, *space, bounds, found)
+    return bounds, found[0], found[1] > 0
+
+
+@pytest.fixture(scope="module", params=[(), (SLAB,)], ids=["ground", "slab"])
+def below(request, hanging):
+    """A hanging chain, and the height of what is below it [m]."""
+    return hanging(*request.param), SLAB.upper[2] * len(request.param)
+
+
+@pytest.mark.parametrize("tested", [2, 4, 32])
+def test_bounds_of_steps_hold_and_are_attained(below, tested):
+    """Within a step between free configurations, the ball dips as deep as it can."""
+    (simulator, level), rng = below, np.random.default_rng(1)
+    moves = rng.uniform(0.05, 0.1, (200, 3)) * rng.choice([-1, 1], (200, 1))
+    dip = np.square(np.cumsum(moves, axis=1)) @ LENGTHS / 8
+    # The chain hangs down at this share of a step; if earlier than halfway, the ball ends higher.
+    lowest = np.where(np.arange(200) % 2, 0.5, rng.uniform(0.3, 0.5, 200))
+    way = np.zeros((tested + 1, 200, 4))
+    way[..., 1:] = (np.arange(tested + 1)[:, None] / tested - lowest)[..., None] * moves
+    # The lowest configuration touches by a fiftieth of the dip.
+    way[..., 0] = level + RADIUS - 0.02 * dip - tips(way)[1:, :, 1].min(axis=0)
+    heights = tips(way)[..., 1] - level - RADIUS
+    bounds, doubt, touching = proofs(simulator, tested, way[0], way[-1])
+    least = heights[1:].min(axis=0)
+    assert (heights[0] > MARGIN).all()
+    assert (bounds <= least + 1e-12).all()
+    attained = (lowest == 0.5) | (tested == 2)
+    assert (bounds > least - 0.01 * dip)[:, attained].all()
+    doubted = heights[1:] <= MARGIN
+    np.testing.assert_array_equal(doubt, (doubted << np.arange(tested)[:, None]).sum(axis=0))
+    first = np.take_along_axis(heights[1:], doubted.argmax(axis=0)[None], axis=0)[0]
+    np.testing.assert_array_equal(touching, first < -DEPTH)
+
+
+def test_nothing_is_claimed_between_margin_and_depth(below):
+    simulator, level = below
+    gaps = np.outer([0.1, 0.9, 1.1], [-DEPTH, MARGIN]).ravel()
+    starts, ends = np.zeros((2, len(gaps), 4))
+    ends[:, 0] = level + RADIUS + LENGTHS.sum() + gaps
+    starts[:, 0] = ends[:, 0] + 0.1
+    _, free, touching, _ = simulator.world.proven(ends)
+    np.testing.assert_array_equal(free, gaps > MARGIN)
+    np.testing.assert_array_equal(touching, gaps < -DEPTH)
+    _, doubt, touching = proofs(simulator, 1, starts, ends)
+    np.testing.assert_array_equal(doubt, gaps <= MARGIN)
+    np.testing.assert_array_equal(touching, gaps < -DEPTH)
