@@ -13,9 +13,10 @@ from gymnasium.envs.registration import EnvSpec
 from gymnasium.spaces import Box, Space
 from numpy.typing import DTypeLike, NDArray
 
+from kinarm.chain import within_limits
 from kinarm.envs.rendering import RENDER_MODES, EnvPictures
 from kinarm.episodes import Episodes, StepResult
-from kinarm.errors import InvalidInputError, UnknownNameError, finite_array
+from kinarm.errors import InvalidInputError, UnknownNameError, one_or_many
 from kinarm.observation import Ranges, observation_bounds
 from kinarm.problem import ProblemLike, ReachProblem
 from kinarm.scenarios import ScenarioQueues
@@ -134,6 +135,11 @@ class Lifecycle:
             raise ResetNeededError("the environment was never begun: call reset()")
         return self._episodes
 
+    @property
+    def configuration(self) -> Array:
+        """A copy of the joint positions, shape (n, n_joints) [rad or m]."""
+        return self.episodes.q.copy()
+
     def _check_open(self) -> None:
         if self.closed:
             raise ClosedEnvironmentError("the environment is closed: make another one")
@@ -184,19 +190,21 @@ class ArmEnvironment(Lifecycle):
         self._pictures = EnvPictures(simulator, render_mode, num_envs, **picture)
 
     def _begin(self, rows: NDArray[np.int64], options: Mapping[str, Any] | None = None) -> Episodes:
-        """Begin episodes of some arms; options may set all ``start`` and ``goal``."""
-        n_joints = self.simulator.arm.n_joints
-        fixed = fixed_scenario(options, n_joints)
-        if "start" in fixed:  # refuse one in contact
-            fixed["start"] = self.simulator.reset(fixed["start"][None], np.zeros((1, 3))).q[0]
+        """Begin episodes of some arms; options may set ``start`` and ``goal``."""
         if self._episodes is None:
-            q, goals = np.empty((self._n_arms, n_joints)), np.empty((self._n_arms, 3))
+            n_joints = self.simulator.arm.n_joints
+            q, goals = np.zeros((self._n_arms, n_joints)), np.zeros((self._n_arms, 3))
         else:
             q, goals = self._episodes.q, self._episodes.goal
+        fixed = fixed_scenario(options, self.simulator, self._n_arms)
+        if "start" in fixed:  # refuse those in contact, before anything changes
+            starts = q.copy()
+            starts[rows] = fixed["start"][rows]
+            self.simulator.reset(starts, goals)
         self._queues.put(rows, q, goals)
-        if fixed:
-            q[rows] = fixed.get("start", q[rows])
-            goals[rows] = fixed.get("goal", goals[rows])
+        for array, name in ((q, "start"), (goals, "goal")):
+            if name in fixed:
+                array[rows] = fixed[name][rows]
         if self._episodes is None:
             self._episodes = self.simulator.reset(q, goals)
         else:
@@ -237,13 +245,39 @@ class ArmEnvironment(Lifecycle):
         self._spec = None if spec is None else portable_spec(spec, self.simulator)
 
 
-def fixed_scenario(options: Mapping[str, Any] | None, n_joints: int) -> dict[str, Array]:
-    """``start`` [rad or m] and ``goal`` [m] in the options of a reset, if any."""
-    given, shapes = dict(options or {}), {"start": (n_joints,), "goal": (3,)}
-    unknown = set(given) - set(shapes)
-    if unknown:
-        raise InvalidInputError(f"unknown reset options {sorted(unknown)}; available: start, goal")
-    return {name: finite_array(name, value, shapes[name]) for name, value in given.items()}
+def fixed_scenario(
+    options: Mapping[str, Any] | None, simulator: Simulator, n: int
+) -> dict[str, Array]:
+    """What the options of a reset set, for n arms.
+
+    Parameters
+    ----------
+    options : mapping, optional
+        ``start``, shape (n_joints,) or (n, n_joints) [rad or m], and ``goal``,
+        shape (3,) or (n, 3) [m]: one for all arms, or one for each.
+    simulator, n : Simulator and int
+        Where, and the number of arms.
+
+    Returns
+    -------
+    dict
+        The same, one row an arm.
+    """
+    arm, fixed = simulator.arm, {}
+    widths = {"start": arm.n_joints, "goal": 3}
+    for name, value in (options or {}).items():
+        if name not in widths:
+            raise UnknownNameError("reset option", name, widths)
+        array, one = one_or_many(name, value, (widths[name],))
+        if not one and len(array) != n:
+            raise InvalidInputError(
+                f"{name} must have a row for each of {n} arms, got {len(array)}"
+            )
+        if name == "start":
+            given = array[0] if one else array
+            array = within_limits(name, given, arm.chain, arm.joint_names)
+        fixed[name] = np.broadcast_to(array, (n, widths[name]))
+    return fixed
 
 
 def portable_spec(spec: EnvSpec, simulator: Simulator) -> EnvSpec:

@@ -74,10 +74,11 @@ class ReachEnv(ArmEnvironment, gymnasium.Env[Any, Array]):
     refused); truncated after 64 steps. Then nothing moves until `reset`: steps
     have the reward 0, and Gymnasium warns.
 
-    **Info**: ``distance`` [m]; and after a step ``success`` and, the same,
-    ``is_success``; ``collision``; ``contact``, the number of the two bodies
-    that would have touched, whose names are ``contact_names[contact]``, or 0;
-    and the five reward terms.
+    **Info**: ``distance`` [m]; ``configuration``, the joint positions [rad or
+    m], as the attribute of that name has them; and after a step ``success``
+    and, the same, ``is_success``; ``collision``; ``contact``, the number of the
+    two bodies that would have touched, whose names are
+    ``contact_names[contact]``, or 0; and the five reward terms.
 
     **Versions**: v0, the first.
     """
@@ -107,7 +108,8 @@ class ReachEnv(ArmEnvironment, gymnasium.Env[Any, Array]):
         if self._episodes is None or seed is not None:
             self._queues.seed(0, self.np_random)
         episode = self._begin(FIRST_ROW, options)
-        return self._observation(episode), {"distance": episode.distance.item()}
+        info = {"distance": episode.distance.item(), "configuration": self.configuration}
+        return self._observation(episode), info
 
     def step(self, action: Array) -> tuple[Observations, float, bool, bool, dict[str, Any]]:
         """Move for one time step."""
@@ -124,13 +126,18 @@ class ReachEnv(ArmEnvironment, gymnasium.Env[Any, Array]):
         self._find_contacts(episode, result)
         self._pictures.step(episode)
         answer = 0.0 if over else reward.item(), terminated.item(), truncated.item()
-        return self._observation(episode), *answer, self._info(result)
+        return self._observation(episode), *answer, self._info(episode, result)
 
     def render(self) -> Any:
         """Take a picture of the arm (``render_mode``)."""
         _ = self.episodes  # refuses if there are none
         pictures = self._pictures.render()
         return pictures and pictures[0]
+
+    @property
+    def configuration(self) -> Array:
+        """A copy of the joint positions, shape (n_joints,) [rad or m]."""
+        return self.episodes.q[0].copy()
 
     def close(self) -> None:
         """Close the live page, if any; nothing can be done afterwards."""
@@ -150,9 +157,10 @@ class ReachEnv(ArmEnvironment, gymnasium.Env[Any, Array]):
     def _observation(self, episode: Episodes) -> Observations:
         return one_by_one(self.interface.observe(episode.observation), 1)[0]
 
-    def _info(self, result: StepResult) -> dict[str, Any]:
+    def _info(self, episode: Episodes, result: StepResult) -> dict[str, Any]:
         told = dict(zip(self._told, result.numbers[1:, 0].tolist(), strict=False))
         _, success, collision = result.flags[:, 0].tolist()
         told["success"] = told["is_success"] = success
         told["collision"], told["contact"] = collision, result.contact.item()
+        told["configuration"] = episode.q[0].copy()
         return told

@@ -95,7 +95,7 @@ class ReachVectorEnv(ArmEnvironment, VectorEnv[Any, Array, NDArray[Any]]):
         """Begin episodes; see `ReachEnv.reset`.
 
         ``options`` may hold ``reset_mask``, a boolean array, shape (num_envs,), of arms to reset,
-        and one ``start`` or ``goal`` for all.
+        and ``start`` and ``goal``, shape (num_envs, n_joints) and (num_envs, 3), or one for all.
         """
         self._check_open()
         chosen = dict(options or {})
@@ -109,7 +109,7 @@ class ReachVectorEnv(ArmEnvironment, VectorEnv[Any, Array, NDArray[Any]]):
         mask[rows] = True
         distance = np.where(mask, episodes.distance, 0.0)
         shown = self.interface.observe(episodes.observation)
-        return shown, {"distance": distance, "_distance": mask}
+        return shown, {"distance": distance, "_distance": mask, **_configurations(episodes, mask)}
 
     def step(
         self, actions: Array
@@ -135,6 +135,7 @@ class ReachVectorEnv(ArmEnvironment, VectorEnv[Any, Array, NDArray[Any]]):
                 rows = (~running).nonzero()[0]
                 reward[rows] = 0.0
                 self._renew(episodes, rows, infos)
+        infos |= _configurations(episodes, infos["_distance"])
         return self.interface.observe(episodes.observation), reward, terminated, truncated, infos
 
     def render(self) -> Any:
@@ -162,6 +163,7 @@ class ReachVectorEnv(ArmEnvironment, VectorEnv[Any, Array, NDArray[Any]]):
         if not rows.size:
             return self._named(tables, ~over)
         finals = self._named(tuple(np.where(over, table, False) for table in tables), over)
+        finals |= _configurations(episodes, over)
         for table in tables:
             np.copyto(table, False, where=over)  # which is a zero of every type
         final_obs = np.empty(self.num_envs, dtype=object)
@@ -200,3 +202,8 @@ class ReachVectorEnv(ArmEnvironment, VectorEnv[Any, Array, NDArray[Any]]):
         if len(seed) != self.num_envs:
             raise InvalidInputError(f"seed must hold {self.num_envs} numbers, got {len(seed)}")
         return [None if one is None else whole_number("seed", one, 0) for one in seed]
+
+
+def _configurations(episodes: Episodes, told: NDArray[np.bool_]) -> dict[str, NDArray[Any]]:
+    """Joint positions of some arms, and which, for infos; zeros for others."""
+    return {"configuration": np.where(told[:, None], episodes.q, 0.0), "_configuration": told}

@@ -42,9 +42,9 @@ class SB3VecEnv(Lifecycle, VecEnv):
     The info of an episode that ended holds what Stable-Baselines3 looks for:
     ``terminal_observation``, ``TimeLimit.truncated``, ``is_success`` and, as of ``Monitor``,
     ``episode`` (return ``r``, length ``l``, time ``t`` since the environment was made [s]); besides
-    ``collision``, ``distance`` [m] and, with replay, ``replayed``: whether it began where an
-    earlier one had failed. That of a refused move holds ``collision``. Other infos are empty, which
-    saves time.
+    ``collision``, ``distance`` [m], ``configuration`` [rad or m] and, with replay, ``replayed``:
+    whether it began where an earlier one had failed. That of a refused move holds ``collision``.
+    Other infos are empty, which saves time.
 
     The arms share this object and its interface, which ``get_attr`` and ``env_method`` ask.
     """
@@ -110,7 +110,7 @@ class SB3VecEnv(Lifecycle, VecEnv):
             self._failed = self._restored
         starts, goals = self._draw(np.arange(self.num_envs))
         for row, options in enumerate(self._options):
-            fixed = fixed_scenario(options, starts.shape[1])
+            fixed = fixed_scenario(options, self.simulator, 1)
             starts[row] = fixed.get("start", starts[row])
             goals[row] = fixed.get("goal", goals[row])
         self._reset_seeds()
@@ -119,6 +119,20 @@ class SB3VecEnv(Lifecycle, VecEnv):
         self._starts[:], self._returns[:] = episodes.q, 0.0
         self._announce(episodes, np.arange(self.num_envs))
         return self.interface.observe(episodes.observation)
+
+    def set_options(self, options: Any = None) -> None:
+        """Set ``start`` and ``goal`` of the next reset.
+
+        Parameters
+        ----------
+        options : mapping or sequence of mapping, optional
+            As for `kinarm.ReachVectorEnv.reset`, or a mapping for each arm.
+        """
+        if isinstance(options, dict):
+            fixed = fixed_scenario(options, self.simulator, self.num_envs)
+            rows = range(self.num_envs)
+            options = [{name: array[row] for name, array in fixed.items()} for row in rows]
+        super().set_options(options)
 
     def _draw(self, rows: NDArray[np.int64]) -> StartsAndGoals:
         """Starts and goals of the next episodes."""
@@ -136,7 +150,7 @@ class SB3VecEnv(Lifecycle, VecEnv):
     def _announce(self, episodes: Episodes, rows: NDArray[np.int64]) -> None:
         """Tell pictures and infos which episodes begin."""
         for row, distance in zip(rows.tolist(), episodes.distance[rows].tolist(), strict=True):
-            self.reset_infos[row] = {"distance": distance}
+            self.reset_infos[row] = {"distance": distance, "configuration": episodes.q[row].copy()}
         self._pictures.begin(rows, episodes)
 
     def step_async(self, actions: NDArray[Any]) -> None:
@@ -171,6 +185,7 @@ class SB3VecEnv(Lifecycle, VecEnv):
                 infos[row] = {
                     "terminal_observation": final,
                     **{name: column[row].item() for name, column in columns.items()},
+                    "configuration": episodes.q[row].copy(),
                     "episode": {"r": total, "l": length, "t": elapsed},
                 }
             self._renew(episodes, ended)
@@ -211,6 +226,8 @@ class SB3VecEnv(Lifecycle, VecEnv):
 
     def get_attr(self, attr_name: str, indices: VecEnvIndices = None) -> list[Any]:
         """An attribute of the environment or its interface, for every arm."""
+        if attr_name == "configuration":  # that of each
+            return list(self.configuration[list(self._get_indices(indices))])
         owner = self if hasattr(self, attr_name) else self.interface
         return [getattr(owner, attr_name) for _ in self._get_indices(indices)]
 

@@ -184,6 +184,54 @@ class TestOptions:
         np.testing.assert_array_equal(observations[:, :3], np.tile(goal, (NUMBER, 1)))
         np.testing.assert_array_equal(observations[0], observations[-1])
 
+    def test_a_start_and_goal_of_each_equal_single_environments(self):
+        batch = native("Disabled")
+        starts, goals = batch.simulator.sample(np.random.default_rng(0), NUMBER)
+        mask = np.arange(NUMBER) % 2 == 0
+        batch.reset(seed=0)
+        rest = batch.configuration
+        for rows, options in ((mask, {"reset_mask": mask}), (np.ones(NUMBER, bool), {})):
+            given = np.where(rows[:, None], starts, 0.0), np.where(rows[:, None], goals, 9.0)
+            if rows.all():
+                given = starts.tolist(), goals
+            observations, infos = batch.reset(
+                options={"start": given[0], "goal": given[1], **options}
+            )
+            np.testing.assert_array_equal(batch.configuration[~rows], rest[~rows])
+            for row in np.flatnonzero(rows):
+                options = {"start": starts[row], "goal": goals[row]}
+                expected, info = ReachEnv("both").reset(options=options)
+                np.testing.assert_array_equal(observations[row], expected)
+                np.testing.assert_array_equal(infos["configuration"][row], info["configuration"])
+
+    @pytest.mark.parametrize(
+        ("options", "message"),
+        [
+            ({"start": np.zeros((3, 6))}, "start must have a row for each of 7 arms, got 3"),
+            ({"goal": np.zeros((NUMBER, 2))}, r"goal must have shape \(n, 3\), got \(7, 2\)"),
+            ({"start": np.zeros(5)}, r"start must have shape \(6\), got \(5,\)"),
+            ({"start": np.eye(NUMBER, 6) * 9}, r"start\[0\] lies outside the limits: "),
+            ({"goals": np.zeros(3)}, "unknown reset option 'goals' .did you mean 'goal'"),
+        ],
+    )
+    def test_bad_options(self, options, message):
+        with pytest.raises(InvalidInputError, match=message):
+            native("SameStep").reset(options=options)
+
+    def test_rounding_beyond_limits_is_clipped(self):
+        batch = native("SameStep")
+        upper = batch.simulator.arm.upper
+        starts = np.zeros((NUMBER, 6))
+        starts[2, 0] = upper[0] + 5e-7
+        batch.reset(seed=0, options={"start": starts})
+        assert batch.configuration[2, 0] == upper[0]
+
+    def test_the_arm_whose_start_is_in_contact_is_named(self):
+        starts = np.zeros((NUMBER, 6))
+        starts[4] = np.deg2rad([0, 110, -60, 0, 0, 0])
+        with pytest.raises(StartInContactError, match="start 4 is in contact"):
+            native("SameStep").reset(options={"start": starts})
+
     def test_failed_reset_leaves_no_half_begun_episodes(self):
         batch, untouched = native("SameStep"), native("SameStep")
         batch.reset(seed=0)
