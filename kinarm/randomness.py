@@ -21,6 +21,7 @@ class Stream(StrEnum):
     PPO_DEMONSTRATIONS = "ppo demonstrations"
     REPLAY = "replay"
     STUDY = "study"
+    DEMONSTRATIONS = "demonstrations"
 
 
 def stream_generator(stream: Stream, seed: int, *numbers: int) -> np.random.Generator:

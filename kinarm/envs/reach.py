@@ -137,7 +137,7 @@ class ReachEnv(ArmEnvironment, gymnasium.Env[Any, Array]):
     @property
     def configuration(self) -> Array:
         """A copy of the joint positions, shape (n_joints,) [rad or m]."""
-        return self.episodes.q[0].copy()
+        return np.array(self.episodes.q[0])
 
     def close(self) -> None:
         """Close the live page, if any; nothing can be done afterwards."""

@@ -19,7 +19,7 @@ from kinarm.policies.policy import layer_widths
 from kinarm.policies.ppo import EpisodeStates, PPOConfig, PPOState
 from kinarm.policies.ppo.arms import TrainingArms, collect
 from kinarm.policies.ppo.networks import ActorCritic, initial_parameters, split_parameters
-from kinarm.policies.ppo.update import demonstrate, imitate, logged, update
+from kinarm.policies.ppo.update import imitate, logged, update
 from kinarm.randomness import Stream, stream_generator
 
 IMITATING = "learning from the oracle's motions first"
@@ -98,13 +98,16 @@ class PPOTraining:
 
     def _taught(self, state: PPOState) -> NDArray[np.float32]:
         """Parameters of an actor that has imitated the oracle."""
+        from kinarm.policies.oracle import Oracle
+
         config, arms, networks = self.config, self.arms, self.networks
         rng = stream_generator(Stream.PPO_DEMONSTRATIONS, config.seed)
         arms.reach_within(config.tolerance_at(0.0))
         scenarios = arms.sample(rng, config.demonstrations)
-        shown = demonstrate(arms.simulator, scenarios, self.threads)
+        oracle = Oracle(arms.simulator.problem, threads=self.threads)
+        shown = oracle.demonstrate(*scenarios)
         networks.load(state.parameters)
-        imitate(networks, shown, state.normalizer, rng, self.threads)
+        imitate(networks, (shown.observations, shown.actions), state.normalizer, rng, self.threads)
         return networks.gathered(networks.weights)
 
     def iterate(self, state: PPOState) -> PPOState:

@@ -10,8 +10,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kinarm._parallel import SHARED_STEPS, run_together
-from kinarm.errors import InvalidInputError
-from kinarm.failed_scenarios import StartsAndGoals
 from kinarm.policies.config import scheduled
 from kinarm.policies.learners import CurvePoint
 from kinarm.policies.normalizer import Normalizer, input_scale
@@ -28,7 +26,6 @@ from kinarm.policies.ppo.kernels.update import (
     standardisation,
 )
 from kinarm.policies.ppo.networks import ActorCritic
-from kinarm.simulator import Simulator
 
 PARTS = 8
 """Parts of a minibatch whose gradients are found independently."""
@@ -161,42 +158,9 @@ LEARNING_RATE = 1e-3
 """Initial step size of Adam; it falls linearly to zero."""
 
 
-class Demonstrations(NamedTuple):
-    """What was seen and done in motions of the oracle, one row a step."""
-
-    observations: NDArray[np.float64]
-    actions: NDArray[np.float64]
-
-
-def demonstrate(
-    simulator: Simulator, scenarios: StartsAndGoals, threads: int | None = None
-) -> Demonstrations:
-    """Let the oracle solve scenarios; unsolved ones are left out.
-
-    Parameters
-    ----------
-    simulator : Simulator
-        What the oracle solves them in.
-    scenarios : tuple of ndarray, shapes (n, n_joints) and (n, 3)
-        Starts [rad or m] and goals [m].
-    threads : int, optional
-        As for `kinarm.policies.Oracle`.
-    """
-    from kinarm.policies.oracle import Oracle
-
-    found = Oracle(simulator.problem, threads=threads).solve_batch(*scenarios)
-    solved = [each for each in zip(found, scenarios[1], strict=True) if each[0].reachable]
-    if not solved:
-        raise InvalidInputError("the oracle finds no motion that could be imitated")
-    paths = np.concatenate([solution.path[:-1] for solution, _ in solved])
-    goals = np.concatenate([np.tile(goal, (solution.steps, 1)) for solution, goal in solved])
-    actions = np.concatenate([solution.actions for solution, _ in solved])
-    return Demonstrations(simulator.world.observe(paths, goals), actions)
-
-
 def imitate(
     networks: ActorCritic,
-    demonstrations: Demonstrations,
+    shown: tuple[NDArray[np.float64], NDArray[np.float64]],
     normalizer: Normalizer,
     rng: np.random.Generator,
     threads: int,
@@ -207,17 +171,19 @@ def imitate(
     ----------
     networks : ActorCritic
         Networks, whose actor is changed.
-    demonstrations, normalizer
-        What is imitated, and statistics that normalise observations.
+    shown : tuple of ndarray, shapes (n, n_observations) and (n, n_actions)
+        Observations, and the actions that are imitated.
+    normalizer : Normalizer
+        Statistics that normalise observations.
     rng : numpy.random.Generator
         Draws minibatches.
     threads : int
         Threads to use; the result does not depend on them.
     """
-    seen = (demonstrations.observations - normalizer.mean) * input_scale(normalizer.std)
-    shown = seen.astype(np.float32), demonstrations.actions.astype(np.float32)
-    n_actions = demonstrations.actions.shape[1]
-    experience = Experience(*shown, *np.empty((4, 0), dtype=np.float32))
+    observations, actions = shown
+    seen = (observations - normalizer.mean) * input_scale(normalizer.std)
+    n_actions, arrays32 = actions.shape[1], (seen.astype(np.float32), actions.astype(np.float32))
+    experience = Experience(*arrays32, *np.empty((4, 0), dtype=np.float32))
     nets = (networks.actor, networks.critic)
     gradients = np.empty((PARTS, len(networks.weights)), dtype=np.float32)
     moments = np.zeros_like(networks.weights), np.zeros_like(networks.weights)

@@ -6,15 +6,13 @@ import numpy as np
 import pytest
 
 from kinarm._console import told_of_activities
-from kinarm.errors import InvalidInputError
-from kinarm.policies import PPOConfig
+from kinarm.policies import Oracle, PPOConfig
 from kinarm.policies.normalizer import Normalizer
 from kinarm.policies.ppo.kernels.update import LOSSES, Experience, Objective, add_gradients
 from kinarm.policies.ppo.learner import IMITATING, PPOTraining
 from kinarm.policies.ppo.networks import ActorCritic, actor_policy, initial_parameters
-from kinarm.policies.ppo.update import BATCH_SIZE, Demonstrations, demonstrate, imitate
+from kinarm.policies.ppo.update import BATCH_SIZE, imitate
 from kinarm.problem import PROBLEMS
-from kinarm.simulator import Simulator
 
 WIDTHS = (7, 9, 5, 3)
 RIGHT = PROBLEMS["right"]
@@ -31,12 +29,7 @@ def made_demonstrations(count=300):
     """Actions that are a smooth function of what is seen."""
     rng = np.random.default_rng(3)
     observations = 2.0 + rng.normal(size=(count, WIDTHS[0]))
-    return Demonstrations(observations, np.tanh(observations[:, :3] - observations[:, 3:6]))
-
-
-@pytest.fixture(scope="module")
-def simulator():
-    return Simulator(RIGHT, threads=1)
+    return observations, np.tanh(observations[:, :3] - observations[:, 3:6])
 
 
 def test_gradient_is_that_of_the_mean_squared_error():
@@ -54,7 +47,7 @@ def test_gradient_is_that_of_the_mean_squared_error():
         add_gradients(0, parts, networks.actor, networks.critic, *given)
         found.append(networks.gathered(gradients.sum(axis=0)))
     np.testing.assert_allclose(found[0], found[1], rtol=0, atol=1e-6)
-    wanted = shown.actions[chosen]
+    wanted = shown[1][chosen]
 
     def loss(vector):
         networks.load(vector.astype(np.float32))
@@ -68,49 +61,23 @@ def test_gradient_is_that_of_the_mean_squared_error():
         assert found[0] @ step == pytest.approx(change / 2, rel=0.02, abs=2e-6)
 
 
-def test_demonstrations_are_motions_that_reach_the_goals(simulator):
-    starts, goals = simulator.sample(np.random.default_rng(0), 40)
-    shown = demonstrate(simulator, (starts, goals), 1)
-    first = np.concatenate([[0], np.flatnonzero(np.diff(shown.observations[:, 0])) + 1])
-    lengths = np.diff([*first, len(shown.actions)])
-    assert len(lengths) == 40
-    actions = np.zeros((40, simulator.task.horizon, simulator.n_actions))
-    for row, (begin, length) in enumerate(zip(first, lengths, strict=True)):
-        actions[row, :length] = shown.actions[begin : begin + length]
-    rollouts = simulator.rollout_actions(actions, starts, goals, record=True)
-    assert rollouts.success.all()
-    np.testing.assert_array_equal(rollouts.steps, lengths)
-    seen = simulator.world.observe(
-        rollouts.paths[5, : lengths[5]], np.tile(goals[5], (lengths[5], 1))
-    )
-    np.testing.assert_allclose(
-        shown.observations[first[5] : first[5] + lengths[5]], seen, atol=1e-12
-    )
-
-
-def test_without_a_motion_there_is_nothing_to_imitate():
-    short = Simulator(RIGHT.replace(horizon=1), threads=1)
-    starts, goals = short.sample(np.random.default_rng(0), 3)
-    with pytest.raises(InvalidInputError, match="no motion that could be imitated"):
-        demonstrate(short, (starts, goals), 1)
-
-
 def test_an_actor_learns_what_it_is_shown_and_the_critic_nothing():
     shown, learnt = made_demonstrations(20 * BATCH_SIZE + 7), []
-    normalizer = Normalizer.of(shown.observations)
+    observations, actions = shown
+    normalizer = Normalizer.of(observations)
     for threads in (1, 3):
         networks, _ = made_networks()
         imitate(networks, shown, normalizer, np.random.default_rng(0), threads)
         learnt.append(networks.gathered(networks.weights))
     np.testing.assert_array_equal(learnt[0], learnt[1])
-    seen = ((shown.observations - normalizer.mean) / normalizer.std).astype(np.float32)
+    seen = ((observations - normalizer.mean) / normalizer.std).astype(np.float32)
     before, _ = made_networks()
-    errors = [np.mean((each.means(seen) - shown.actions) ** 2) for each in (before, networks)]
+    errors = [np.mean((each.means(seen) - actions) ** 2) for each in (before, networks)]
     assert errors[1] < 0.25 * errors[0]
     np.testing.assert_array_equal(networks.values(seen, 1), before.values(seen, 1))
 
 
-def test_a_training_begins_with_what_was_imitated(simulator):
+def test_a_training_begins_with_what_was_imitated():
     config = PPOConfig(
         problem=RIGHT,
         symmetric=True,
@@ -121,7 +88,7 @@ def test_a_training_begins_with_what_was_imitated(simulator):
         net_arch=(32, 32),
         demonstrations=300,
     )
-    fresh = demonstrate(simulator, simulator.sample(np.random.default_rng(1), 100), 1)
+    fresh = Oracle(RIGHT, threads=1).demonstrations(100)
 
     def error(config, threads=1):
         state = PPOTraining(config, threads=threads).initial_state()
