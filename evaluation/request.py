@@ -143,6 +143,8 @@ class EvaluationRequest(ProblemOptions, TableOptions):
         alone = (("--json", self.json), ("--markdown", self.markdown), ("--csv -", self.prints_csv))
         if len(given := [option for option, is_given in alone if is_given]) > 1:
             raise InvalidInputError(f"{given[0]} and {given[1]} exclude each other")
+        if self.json and self.columns:
+            raise InvalidInputError("--columns is for tables, and --json prints the whole document")
 
     def run(self, command: str | None = None, tell: Tell = lambda _: None) -> "EvaluationDocument":
         """Evaluate, and write the outputs.

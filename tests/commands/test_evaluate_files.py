@@ -93,6 +93,7 @@ class TestCsv:
         [
             (("--columns", "colision"), "unknown column 'colision' (did you mean 'collision'?)"),
             (("--csv", "table.txt"), "the output must be a file that ends in .csv"),
+            (("--columns", "success", "--json"), "--columns is for tables"),
             (("--csv", "-", "--json"), "--json and --csv - exclude each other"),
         ],
     )
