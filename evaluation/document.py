@@ -10,9 +10,10 @@ from kinarm._files import reading
 from kinarm.episodes import Outcome
 from kinarm.errors import InvalidInputError, UnknownNameError, finite_array
 from kinarm.evaluation.bounds import Bounds, bounds_document
+from kinarm.evaluation.estimates import BOOTSTRAP_SEED, RESAMPLES
 from kinarm.evaluation.outcomes import Cause, Pair
 from kinarm.evaluation.schemas import Count, Digest, Document, Share
-from kinarm.evaluation.statistics import BOOTSTRAP_SEED, LEVEL, RESAMPLES, Estimate
+from kinarm.evaluation.statistics import LEVEL, Estimate
 from kinarm.evaluation.trials import TrialSet
 from kinarm.policies.oracle.oracle import OracleSolutions
 from kinarm.problem import ReachProblem
@@ -23,9 +24,10 @@ class Intervals(Document, frozen=True, kw_only=True):
     """How the 95 % intervals are made."""
 
     level: Share = LEVEL
-    shares: str = "Wilson"
+    shares: str = "mid-P"
+    means: str = "Student, the farthest trial once more"
     distances: str = "percentile bootstrap over trials"
-    pooled: str = "Student, over training seeds and trials"
+    pooled: str = "Student, over training seeds and trials that all of them face"
     resamples: Count = RESAMPLES
     bootstrap_seed: Count = BOOTSTRAP_SEED
 

@@ -28,11 +28,12 @@ from kinarm.evaluation.document import (
     TrialHolding,
     WorstSeed,
 )
+from kinarm.evaluation.estimates import estimate_metrics
 from kinarm.evaluation.finding import contestant_of
 from kinarm.evaluation.outcomes import Holding, Outcomes, failure_causes
 from kinarm.evaluation.predictors import Wrapper
 from kinarm.evaluation.selection import check_names, group_names
-from kinarm.evaluation.statistics import Estimate, estimate_metrics
+from kinarm.evaluation.statistics import Estimate
 from kinarm.evaluation.trials import TrialSet
 from kinarm.policies.oracle.oracle import OracleSolutions
 from kinarm.policies.policy import Policy

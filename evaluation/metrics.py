@@ -40,8 +40,8 @@ class Metric:
         works along the last axis of many resamples.
     unit : str
         ``"%"`` for shares, kept as fractions and shown in per cent.
-    interval : ``"Wilson"``, ``"bootstrap"`` or None
-        How its 95 % interval is made. Wilson's is for shares of trials; the
+    interval : ``"share"``, ``"mean"``, ``"bootstrap"`` or None
+        How its 95 % interval is made. For shares and means over trials, the
         formula also gets each trial by itself.
     needs_bounds, needs_holding : bool
         Whether it needs the oracle, or trials that go on after success.
@@ -61,7 +61,7 @@ class Metric:
     definition: str
     formula: Callable[[Outcomes], Any]
     unit: str = ""
-    interval: Literal["Wilson", "bootstrap"] | None = None
+    interval: Literal["share", "mean", "bootstrap"] | None = None
     needs_bounds: bool = False
     needs_holding: bool = False
     heading: str = ""
@@ -89,7 +89,7 @@ def _share_of(
         definition=definition,
         formula=lambda trials: hits(trials).mean(axis=-1),
         unit="%",
-        interval="Wilson",
+        interval="share",
         digits=1,
         **shown,
     )
@@ -165,6 +165,7 @@ METRICS: dict[str, Metric] = {
     "mean_distance": _distance(
         meaning=f"mean of the {FINAL}",
         definition="Σ dᵢ / n",
+        interval="mean",
         formula=lambda trials: trials.distance.mean(axis=-1),
         heading="mean distance m",
         priority=2,

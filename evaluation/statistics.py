@@ -1,10 +1,10 @@
-"""Figures of merit and contrasts with their 95 % intervals.
+"""Shares, means, differences and contrasts with their 95 % intervals.
 
-They are written out, because SciPy's take longer to load than a policy to evaluate.
+`docs/measurements/intervals.py` simulates how often they cover the truth.
 """
 
 import math
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
@@ -12,18 +12,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from kinarm.evaluation.metrics import METRICS, Metric
-from kinarm.evaluation.outcomes import Outcomes
-
 LEVEL = 0.95
-RESAMPLES = 1000
-BOOTSTRAP_SEED = 0
 
 DEVIATIONS = 1.959963984540054
 """Standard deviations that enclose this share of a normal distribution."""
 
-NUMBERS_AT_ONCE = 400_000
-"""Trial numbers that are resampled at once, which limits the memory."""
+UNSEEN = 0.2
+"""Trials that might have gone otherwise for all seeds alike, beside those that were seen."""
+
+HALVINGS = 30
+"""Steps of bisection to the end of an interval."""
 
 Interval = tuple[float, float]
 
@@ -45,8 +43,8 @@ class Estimate:
 
     @classmethod
     def share(cls, hits: NDArray[np.bool_]) -> "Estimate":
-        """Share of trials that hit, with its Wilson interval; shape (n_trials,)."""
-        return cls(float(hits.mean()), wilson_interval(int(hits.sum()), len(hits)))
+        """Share of trials that hit, with its mid-P interval; shape (n_trials,)."""
+        return share_over_seeds(hits[None])
 
     def __str__(self) -> str:
         interval = " ({:.3g}..{:.3g})".format(*self.ci95) if self.ci95 else ""
@@ -57,118 +55,6 @@ class Estimate:
         return {"value": self.value, "ci95": self.ci95 and list(self.ci95)}
 
 
-def estimate_metrics(outcomes: Outcomes) -> dict[str, Estimate]:
-    """Compute all `METRICS` with intervals; unknown figures stay empty.
-
-    Intervals are about other trials, and with several training seeds also about other trainings.
-    """
-    known = {
-        name: metric
-        for name, metric in METRICS.items()
-        if (outcomes.bounds is not None or not metric.needs_bounds)
-        and (outcomes.holding or not metric.needs_holding)
-    }
-    intervals = _bootstrapped(outcomes, known) | _of_shares(outcomes, known)
-    estimates = dict.fromkeys(METRICS, Estimate(None))
-    for name, metric in known.items():
-        value = metric.formula(outcomes)
-        if value is not None and not np.isnan(value):
-            estimates[name] = Estimate(float(value), intervals.get(name))
-    return estimates
-
-
-def _of_shares(outcomes: Outcomes, known: Mapping[str, Metric]) -> dict[str, Interval | None]:
-    """Intervals of the metrics that are shares of trials."""
-    each = np.arange(len(outcomes.rollouts[0].success))[:, None]
-    seeds = [outcomes.of_seed(seed).resampled(each) for seed in range(len(outcomes.rollouts))]
-    return {
-        name: share_over_seeds(np.array([metric.formula(seed) for seed in seeds])).ci95
-        for name, metric in known.items()
-        if metric.interval == "Wilson"
-    }
-
-
-def _bootstrapped(outcomes: Outcomes, known: Mapping[str, Metric]) -> dict[str, Interval | None]:
-    """Intervals of other metrics, from resamples of the trials.
-
-    With several training seeds, the variance over the seeds is added to that over the trials, as
-    in `contrast`.
-    """
-    formulas = {name: each.formula for name, each in known.items() if each.interval == "bootstrap"}
-
-    def figures(some: Outcomes) -> NDArray[np.float64]:
-        return np.stack([formula(some) for formula in formulas.values()])
-
-    trials, seeds = len(outcomes.rollouts[0].success), len(outcomes.rollouts)
-    if trials == 1:
-        return dict.fromkeys(formulas)
-    pieces = [figures(outcomes.resampled(numbers)) for numbers in resamples(trials)]
-    found = np.concatenate(pieces, axis=-1)
-    if seeds == 1:
-        return dict(zip(formulas, map(percentile_interval, found), strict=True))
-    each = np.stack([figures(outcomes.of_seed(seed)) for seed in range(seeds)], axis=-1)
-    intervals: dict[str, Interval | None] = {}
-    for name, of_seeds, of_trials in zip(formulas, each, found, strict=True):
-        value = float(formulas[name](outcomes))
-        parts = [(of_seeds.var(ddof=1) / seeds, seeds - 1), (of_trials.var(ddof=1), trials - 1)]
-        low, high = student(value, parts).ci95 or (value, value)
-        intervals[name] = (max(low, 0.0) if known[name].unit == "m" else low, high)
-    return intervals
-
-
-def wilson_interval(hits: int, trials: int, seeds: int = 1) -> Interval:
-    """95 % interval of a share of trials (Wilson 1927); exact where none or all hit.
-
-    Parameters
-    ----------
-    hits, trials : int
-        Hits of all seeds together, and the trials that every seed faced.
-    seeds : int
-        Number of training seeds. They face the same trials and are no
-        independent evidence: the interval is that of the trials of one, widened
-        to whole hits.
-    """
-
-    def end(hits: int, side: int) -> float:
-        share, z = hits / trials, DEVIATIONS
-        spread = 2 * (trials + z**2)
-        centre = (2 * trials * share + z**2) / spread
-        return centre + side * (z / spread * math.sqrt(4 * trials * share * (1 - share) + z**2))
-
-    few, many = hits // seeds, -(-hits // seeds)
-    return end(few, -1) if few > 0 else 0.0, end(many, 1) if many < trials else 1.0
-
-
-def percentile_interval(figures: NDArray[np.float64]) -> Interval:
-    """Ends of the middle 95 % of figures, shape (n_resamples,)."""
-    ordered, tail = np.sort(figures), (1 - LEVEL) / 2
-    return _quantile(ordered, tail), _quantile(ordered, 1 - tail)
-
-
-def resamples(trials: int) -> Iterable[NDArray[np.int64]]:
-    """Trial numbers of all resamples, in pieces of shape (n, trials); seeded."""
-    return _kept(trials) if RESAMPLES * trials <= NUMBERS_AT_ONCE else _drawn(trials)
-
-
-@lru_cache(maxsize=1)
-def _kept(trials: int) -> tuple[NDArray[np.int64], ...]:
-    """A single piece, kept for the next policy with as many trials."""
-    return tuple(_drawn(trials))
-
-
-def _drawn(trials: int) -> Iterator[NDArray[np.int64]]:
-    rng, at_once = np.random.default_rng(BOOTSTRAP_SEED), max(1, NUMBERS_AT_ONCE // trials)
-    for done in range(0, RESAMPLES, at_once):
-        yield rng.integers(trials, size=(min(at_once, RESAMPLES - done), trials))
-
-
-def _quantile(ordered: NDArray[np.float64], share: float) -> float:
-    """Quantile, interpolated linearly."""
-    rank = share * len(ordered) + (1 - share)
-    below, beyond = int(rank) - 1, rank % 1
-    return float((1 - beyond) * ordered[below] + beyond * ordered[below + 1])
-
-
 def estimate_text(estimate: Estimate) -> str:
     """A statistic and its interval in words."""
     if estimate.value is None:
@@ -177,78 +63,159 @@ def estimate_text(estimate: Estimate) -> str:
     return f"{estimate.value:.3f} ({interval})"
 
 
-def contrast(terms: Sequence[tuple[float, NDArray[np.float64]]]) -> Estimate:
-    """Weighted sum of means over seeds and trials: of weights, and values (n_seeds, n_trials).
+Terms = Sequence[tuple[float, NDArray[Any]]]
+"""Weights, and values of shape (n_seeds, n_trials)."""
+
+
+def contrast(terms: Terms) -> Estimate:
+    """Weighted sum of means over seeds and trials; no interval where a term has one seed.
 
     Seeds and trials are crossed random effects: all seeds, and perhaps several recipes and tasks,
-    face the same trials. The variance is that of the seeds' means, in each term, plus that of the
-    trials' weighted means. Both contain the interaction of seed and trial, so the interval is
-    rather too wide. It is Student's, with the degrees of freedom of Welch and Satterthwaite.
+    face the same trials.
     """
-    value = sum(weight * float(values.mean()) for weight, values in terms)
-    parts = [
-        (weight**2 * _mean_variance(values.mean(axis=1)), len(values) - 1)
-        for weight, values in terms
-    ]
-    per_trial = np.sum([weight * values.mean(axis=0) for weight, values in terms], axis=0)
-    return student(value, [*parts, (_mean_variance(per_trial), len(per_trial) - 1)])
-
-
-def student(value: float, components: Iterable[tuple[float, int]]) -> Estimate:
-    """Interval from independent components of the variance.
-
-    They are estimated variances that add up to that of the statistic, with their degrees of
-    freedom; where one has none, there is no interval.
-    """
-    from scipy.special import stdtrit
-
-    variances, freedom = (np.array(part, dtype=float) for part in zip(*components, strict=True))
-    if not freedom.all():
-        return Estimate(value, None)
-    total = float(variances.sum())
-    if not total:
-        return Estimate(value, (value, value))
-    effective = total**2 / float((variances**2 / freedom).sum())
-    reach = float(stdtrit(effective, (1 + LEVEL) / 2)) * total**0.5
+    value = _weighted_mean(terms)
+    if any(min(values.shape) < 2 for _, values in terms):
+        return Estimate(value)
+    reach = math.sqrt(_crossed_reach(terms))
     return Estimate(value, (value - reach, value + reach))
 
 
-def mean_share(shares: NDArray[np.float64], n_trials: int) -> Estimate:
-    """Mean of the seeds' shares of trials.
+def mean_interval(*sides: NDArray[np.float64]) -> Interval | None:
+    """95 % interval of a mean over seeds and trials, or of one less another.
 
-    The trials' part of the variance is that of a binomial share, with two hits and two misses
-    added (Agresti and Coull), so that it never vanishes. The ``n_trials`` count as if all seeds
-    had met the same ones.
+    As in `contrast`, but that a single seed stands for itself, and that the farthest trial of each
+    side counts once more: few trials seldom have seen the worst. Shape (n_seeds, n_trials) each.
     """
-    value = float(shares.mean())
-    moderate = (value * n_trials + 2) / (n_trials + 4)
-    binomial = moderate * (1 - moderate) / (n_trials + 4)
-    components = [(_mean_variance(shares), len(shares) - 1), (binomial, n_trials - 1)]
-    ci95 = student(value, components).ci95
-    return Estimate(value, ci95 and (max(ci95[0], 0.0), min(ci95[1], 1.0)))
+    trials = sides[0].shape[1]
+    if trials == 1:
+        return None
+    farthest = [int(values.mean(axis=0).argmax()) for values in sides]
+    faced = [*range(trials), *farthest]
+    terms = [(weight, values[:, faced]) for weight, values in zip((1.0, -1.0), sides, strict=False)]
+    middle, reach = _weighted_mean(terms), math.sqrt(_crossed_reach(terms))
+    return middle - reach, middle + reach
+
+
+def share_difference(first: NDArray[Any], second: NDArray[Any]) -> Estimate:
+    """Difference of two shares of the same trials, and its 95 % interval.
+
+    As in `contrast`, but that `UNSEEN` more trials are allowed for where the one alone hits, and
+    as many for the other. A single seed stands for itself: the interval is then about other trials
+    alone. Hits have shape (n_seeds, n_trials).
+    """
+    terms, trials = ((1.0, first), (-1.0, second)), first.shape[1]
+    value = _weighted_mean(terms)
+    if trials == 1:
+        return Estimate(value)
+    unseen = 2 * UNSEEN * (student(trials) / trials) ** 2
+    reach = math.sqrt(_crossed_reach(terms) + unseen)
+    return Estimate(value, (max(value - reach, -1.0), min(value + reach, 1.0)))
+
+
+def _weighted_mean(terms: Terms) -> float:
+    return sum(weight * float(values.mean()) for weight, values in terms)
+
+
+def _crossed_reach(terms: Terms) -> float:
+    """Square of the half width of an interval over seeds and trials.
+
+    It is the sum of Student's for the seeds of each term, with their own degrees of freedom
+    (Banerjee 1960), and for the trials. Either contains the interaction of seed and trial; that of
+    the trials is taken without it.
+    """
+    squares, noise = 0.0, 0.0
+    of_trials = np.sum([weight * values.mean(axis=0) for weight, values in terms], axis=0)
+    for weight, values in terms:
+        seeds, trials = values.shape
+        if seeds > 1:
+            each = values.mean(axis=1)
+            squares += weight**2 * float(squared_reach(each))
+            rest = values - each[:, None] - values.mean(axis=0) + values.mean()
+            noise += weight**2 * float((rest**2).sum()) / (seeds * (seeds - 1) * (trials - 1))
+    beyond = float(squared_reach(of_trials)) - student(trials) ** 2 * noise / trials
+    return squares + max(beyond, 0.0)
+
+
+def squared_reach(values: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Square of half of Student's interval for the mean of independent values, shape (n, ...)."""
+    square: NDArray[np.float64] = values.var(axis=0, ddof=1) / len(values)
+    return student(len(values)) ** 2 * square
+
+
+@lru_cache(maxsize=32)
+def student(count: int) -> float:
+    """Standard errors that Student's interval of a mean of ``count`` values reaches."""
+    from scipy.special import stdtrit
+
+    return float(stdtrit(count - 1, (1 + LEVEL) / 2))
 
 
 def share_over_seeds(hits: NDArray[Any]) -> Estimate:
     """A share of trials and its 95 % interval.
 
-    That of one seed is Wilson's. That of several covers Wilson's and the one over seeds and trials
-    (`contrast`), which says nothing where all seeds agree. Hits, shape (n_seeds, n_trials), may be
-    shares of several trainings as well.
+    Hits, shape (n_seeds, n_trials), may be shares of several trainings as well. The interval of
+    one seed is the mid-P one; that of several as well, of as many independent trials as would have
+    the variance over seeds and trials (see `contrast`).
     """
-    share = float(hits.mean())
-    low, high = wilson_interval(round(share * hits.shape[1]), hits.shape[1])
-    if len(hits) > 1:
-        crossed = contrast([(1.0, hits.astype(np.float64))]).ci95 or (share, share)
-        low, high = min(low, crossed[0]), max(high, crossed[1])
-    return Estimate(share, (max(low, 0.0), min(high, 1.0)))
+    share, (seeds, trials) = float(hits.mean()), hits.shape
+    if min(seeds, trials) == 1:
+        return Estimate(share, _mid_p(share, trials))
+    return Estimate(share, _share_interval(share, _crossed_reach([(1.0, hits)]), seeds, trials))
+
+
+def mean_share(shares: NDArray[np.float64], n_trials: int) -> Estimate:
+    """Mean of the seeds' shares of trials that are not known one by one.
+
+    The ``n_trials`` count as if all seeds had met the same ones.
+    """
+    share = float(shares.mean())
+    if len(shares) == 1:
+        return Estimate(share)
+    binomial = DEVIATIONS**2 * share * (1 - share) / n_trials
+    square = float(squared_reach(shares)) + binomial
+    return Estimate(share, _share_interval(share, square, len(shares), n_trials))
+
+
+def _share_interval(share: float, square: float, seeds: int, trials: int) -> Interval:
+    """Interval of a share from the square of its reach.
+
+    The reach tells how many trials count as one. Few hits, or few misses, cannot tell whether
+    seeds share them: `UNSEEN` trials of one seed are added that all of them do.
+    """
+    rare, often = min(share, 1 - share) * trials, max(share, 1 - share)
+    alike = square / DEVIATIONS**2 * seeds * trials**2 / often
+    effect = (alike + UNSEEN * seeds) / (rare + UNSEEN)
+    return _mid_p(share, seeds * trials / max(effect, 1.0))
+
+
+@lru_cache(maxsize=1024)
+def _mid_p(share: float, trials: float) -> Interval:
+    """Mid-P interval of a share of independent trials (Lancaster 1961).
+
+    It is the exact one of Clopper and Pearson, but that what was seen counts half in either tail.
+    Trials may be a fraction.
+    """
+    from scipy.special import betainc
+
+    def least(hits: float, misses: float) -> float:
+        low, high = 0.0, 1.0
+        for _ in range(HALVINGS if hits > 0 else 0):
+            middle = (low + high) / 2
+            tails = betainc(hits, misses + 1, middle)
+            tails += betainc(hits + 1, misses, middle) if misses > 0 else 0.0
+            low, high = (middle, high) if tails < 1 - LEVEL else (low, middle)
+        return low
+
+    hits, misses = share * trials, (1 - share) * trials
+    return least(hits, misses), 1 - least(misses, hits)
 
 
 def superiority(pairs: Sequence[tuple[NDArray[np.float64], NDArray[np.float64]]]) -> Estimate:
     """Probability that a member of the first group is below one of the second; ties count half.
 
-    Measures of the same groups, and then pairs of groups, are averaged. The interval is Wilson's,
-    for as many independent comparisons as the smaller groups have members: the variance of the
-    statistic is at most theirs (van Dantzig 1951). Groups have shape (n_measures, n_seeds);
+    Measures of the same groups, and then pairs of groups, are averaged. The interval is the mid-P
+    one, for as many independent comparisons as the smaller groups have members: the variance of
+    the statistic is at most theirs (van Dantzig 1951). Groups have shape (n_measures, n_seeds);
     infinity stands for never.
     """
     below = [
@@ -257,12 +224,4 @@ def superiority(pairs: Sequence[tuple[NDArray[np.float64], NDArray[np.float64]]]
     ]
     value = float(np.mean([comparisons.mean() for comparisons in below]))
     n = sum(min(first.shape[1], second.shape[1]) for first, second in pairs)
-    z2 = DEVIATIONS**2
-    centre = (value + z2 / (2 * n)) / (1 + z2 / n)
-    reach = (z2 * (value * (1 - value) / n + z2 / (4 * n * n))) ** 0.5 / (1 + z2 / n)
-    return Estimate(value, (centre - reach, centre + reach))
-
-
-def _mean_variance(values: NDArray[np.float64]) -> float:
-    """Variance of the mean of independent values; 0 for a single one."""
-    return float(values.var(ddof=1)) / len(values) if len(values) > 1 else 0.0
+    return Estimate(value, _mid_p(value, n))

@@ -49,7 +49,7 @@ AREAS = {
         20,
     ),
     "statistics": Area(
-        ("evaluation/statistics.py",),
+        ("evaluation/statistics.py", "evaluation/estimates.py"),
         ("evaluation/test_statistics*.py", "evaluation/test_metrics.py"),
         10,
     ),

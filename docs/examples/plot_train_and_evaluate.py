@@ -52,7 +52,7 @@ panels[1].set(xlabel="environment steps [million]", ylim=(0, 1))
 # --------
 # :py:func:`~kinarm.evaluation.evaluate` puts a policy to trials whose starts and goals depend on
 # problem and seed alone. The baseline ``"random"`` acts uniformly at random in the same trials.
-# Shares come with 95 % Wilson intervals.
+# Shares come with 95 % intervals.
 
 evaluations = {
     "trained": evaluate(result.policy, trials=200),

@@ -13,9 +13,9 @@ from docs.transfer.study import SOURCE, Training, TransferRun, TransferStudy, ta
 from kinarm._fields import to_plain
 from kinarm.evaluation.statistics import (
     Estimate,
-    contrast,
+    share_difference,
     share_over_seeds,
-    student,
+    squared_reach,
     superiority,
 )
 from kinarm.evaluation.trials import TrialSet, trial_set
@@ -120,7 +120,7 @@ class TransferResults:
                         "success_each": success.mean(axis=1).tolist(),
                         "collision": share_over_seeds(collision).to_json(),
                         "from_scratch": own and share_over_seeds(own[0]).to_json(),
-                        "difference": own and _difference(success, own[0]).to_json(),
+                        "difference": own and share_difference(success, own[0]).to_json(),
                     }
 
     def warm_start(self) -> Iterator[dict[str, Any]]:
@@ -141,7 +141,7 @@ class TransferResults:
                         "iterations": warm[0].looks[-1].iteration,
                         "warm": share_over_seeds(ends[0]).to_json(),
                         "scratch": share_over_seeds(ends[1]).to_json(),
-                        "difference": _difference(*ends).to_json(),
+                        "difference": share_difference(*ends).to_json(),
                         "until": [self._until(level, warm, scratch) for level in LEVELS],
                     }
 
@@ -219,21 +219,11 @@ class TransferResults:
         )
 
 
-def _difference(first: NDArray[np.bool_], second: NDArray[np.bool_]) -> Estimate:
-    """Difference of shares of the same trials, shape (n_seeds, n_trials) each; from -1 to 1."""
-    terms = ((1.0, first), (-1.0, second))
-    estimate = contrast([(sign, hits.astype(np.float64)) for sign, hits in terms])
-    if estimate.ci95 is None:
-        return estimate
-    low, high = estimate.ci95
-    return Estimate(estimate.value, (max(low, -1.0), min(high, 1.0)))
-
-
 def ratio_of_means(first: NDArray[np.float64], second: NDArray[np.float64]) -> Estimate:
     """Ratio of geometric means of independent numbers, and its 95 % interval.
 
-    The interval is Student's for the difference of mean logarithms, with the degrees of freedom
-    of Welch and Satterthwaite. There is no ratio where a number is zero or infinite.
+    The interval is that of the difference of mean logarithms, whose reach is those of either mean
+    added as squares (Banerjee 1960). There is no ratio where a number is zero or infinite.
     """
     logarithms = [np.log(each) for each in (first, second) if (each > 0).all()]
     if len(logarithms) < 2 or not all(np.isfinite(each).all() for each in logarithms):
@@ -241,6 +231,5 @@ def ratio_of_means(first: NDArray[np.float64], second: NDArray[np.float64]) -> E
     value = float(logarithms[0].mean() - logarithms[1].mean())
     if min(map(len, logarithms)) < 2:
         return Estimate(math.exp(value))
-    parts = [(float(each.var(ddof=1)) / len(each), len(each) - 1) for each in logarithms]
-    low, high = student(value, parts).ci95 or (value, value)
-    return Estimate(math.exp(value), (math.exp(low), math.exp(high)))
+    reach = math.sqrt(sum(float(squared_reach(each)) for each in logarithms))
+    return Estimate(math.exp(value), (math.exp(value - reach), math.exp(value + reach)))

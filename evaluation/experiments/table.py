@@ -16,7 +16,7 @@ from kinarm.evaluation.experiments.plan import Run
 from kinarm.evaluation.experiments.runs import TrainedRun
 from kinarm.evaluation.metrics import METRICS
 from kinarm.evaluation.outcomes import Outcomes
-from kinarm.evaluation.statistics import Estimate, share_over_seeds, wilson_interval
+from kinarm.evaluation.statistics import Estimate, share_over_seeds
 from kinarm.evaluation.table import SEEDS_PRIORITY, metric_column
 from kinarm.policies.config import TrainingConfig
 from kinarm.policies.oracle import OracleSolutions
@@ -242,10 +242,7 @@ def curve_rows(study: "Study") -> list[dict[str, Any]]:
 
 
 def group_entries(group: Group) -> dict[str, Any]:
-    """A group as JSON holds it.
-
-    ``ci95`` is over seeds and trials, ``ci95_of_trials`` over the trials alone.
-    """
+    """A group as JSON holds it; intervals are over seeds and trials."""
     touched = np.array([run.outcomes.collision for run in group.runs])
     return {
         "trainings": group.label,
@@ -253,8 +250,8 @@ def group_entries(group: Group) -> dict[str, Any]:
         "problem": group.config.problem.name,
         "choices": dict(group.choices),
         "seeds": len(group.runs),
-        "success": _share(group.hits),
-        "collision": _share(touched),
+        "success": group.success.to_json(),
+        "collision": share_over_seeds(touched).to_json(),
         "success_each": group.hits.mean(axis=1).tolist(),
         "median_distance": float(np.mean([run.last.median_distance for run in group.runs])),
         "steps_to_success": group.steps_to_success,
@@ -263,11 +260,6 @@ def group_entries(group: Group) -> dict[str, Any]:
         "processor_seconds": group.processor_seconds,
         "until": [_until_entries(group, level) for level in LEVELS],
     }
-
-
-def _share(hits: NDArray[np.bool_]) -> dict[str, Any]:
-    interval = wilson_interval(int(hits.sum()), hits.shape[1], len(hits))
-    return {**share_over_seeds(hits).to_json(), "ci95_of_trials": list(interval)}
 
 
 def _until_entries(group: Group, level: float) -> dict[str, Any]:

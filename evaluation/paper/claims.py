@@ -16,7 +16,13 @@ from kinarm.evaluation.paper.results import (
     Reading,
     final_distances,
 )
-from kinarm.evaluation.statistics import Estimate, contrast, mean_share, superiority
+from kinarm.evaluation.statistics import (
+    Estimate,
+    contrast,
+    mean_share,
+    share_over_seeds,
+    superiority,
+)
 from kinarm.problem import PROBLEMS
 
 Verdict = Literal["holds", "does not hold", "undecided", "not judged"]
@@ -124,8 +130,7 @@ def assess(results: PaperResults, reading: Reading = LITERAL) -> tuple[Claim, ..
 def _mostly_near(results: PaperResults, reading: Reading, task: str) -> Claim:
     """Section 4: on tasks 1 and 2, most trials end within 0.2."""
     near = final_distances(results.select("ars", task, reading)) <= NEAR
-    estimate = mean_share(near.mean(axis=1), near.shape[1])
-    part = ClaimPart(f"share of trials within {NEAR} m", estimate, "above", 0.5)
+    part = ClaimPart(f"share of trials within {NEAR} m", share_over_seeds(near), "above", 0.5)
     return Claim(f"ars-{task}", f"ARS mostly ends within {NEAR} m on {task}", (part,))
 
 

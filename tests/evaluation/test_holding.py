@@ -6,11 +6,11 @@ import pytest
 
 import kinarm  # noqa: F401 registers the environments
 from kinarm.evaluation.contestants import AIM, ORACLE, Contestant, measure_holding
+from kinarm.evaluation.estimates import estimate_metrics
 from kinarm.evaluation.evaluation import run_trials
 from kinarm.evaluation.finding import find_contestants
 from kinarm.evaluation.metrics import CLOSE, HOLDING_WITHIN
 from kinarm.evaluation.outcomes import HOLDING_STEPS, Holding, Outcomes
-from kinarm.evaluation.statistics import estimate_metrics
 
 
 @pytest.fixture(scope="module")

@@ -2,13 +2,11 @@
 
 import re
 from math import log, sqrt
-from statistics import NormalDist
 from xml.etree import ElementTree
 
 import numpy as np
 import pytest
 from drawings import PIXEL
-from scipy import stats
 
 from kinarm.evaluation.evaluation import evaluate, evaluation_document
 from kinarm.evaluation.report import charts
@@ -16,6 +14,7 @@ from kinarm.evaluation.report.charts import level
 from kinarm.evaluation.report.groups import group_results
 from kinarm.evaluation.report.page import report_page
 from kinarm.evaluation.report.templating import template_environment
+from kinarm.evaluation.statistics import share_over_seeds
 from kinarm.problem import ReachProblem
 from kinarm.scene import GoalRegion, Obstacle, Scene
 from kinarm.task import ReachTask
@@ -49,14 +48,6 @@ def coordinates(path: str) -> np.ndarray:
     return np.array(re.findall(r"(-?[\d.]+)[ ,](-?[\d.]+)", path), dtype=float)
 
 
-def wilson(hits: int, trials: int) -> tuple[float, float]:
-    """Wilson's interval from its formula."""
-    z, share = NormalDist().inv_cdf(0.975), hits / trials
-    centre = share + z**2 / (2 * trials)
-    half = z * sqrt(share * (1 - share) / trials + z**2 / (4 * trials**2))
-    return (centre - half) / (1 + z**2 / trials), (centre + half) / (1 + z**2 / trials)
-
-
 CHART = template_environment(autoescape=True).get_template("chart.html").module
 
 
@@ -84,23 +75,15 @@ class TestProfile:
         for edge in (0, -1):
             assert xs[edge] == pytest.approx(places(limits)[edge], abs=PIXEL)
 
-    def test_band_covers_wilsons_interval_and_that_over_seeds(self, page, right):
+    def test_band_is_the_interval_at_each_distance(self, page, right):
         group = next(group for group in right.groups if group.name == "made-right")
         (band,) = shapes(page, "made-right", "band")
-        limits, trials = charts.profiles(right)[0], group.distances.shape[1]
+        limits = charts.profiles(right)[0]
         there, back = np.split(coordinates(band.get("d"))[: 2 * len(limits)], 2)
-        tolerance = PIXEL / self.SPAN
         for place, limit in enumerate(limits):
-            hits = group.distances <= limit
             drawn = [(self.BOTTOM - y) / self.SPAN for y in (back[-1 - place, 1], there[place, 1])]
-            low, high = wilson(round(hits.mean() * trials), trials)
-            assert drawn[0] <= low + tolerance
-            assert drawn[1] >= high - tolerance
-            shares = hits.mean(axis=1)
-            if np.ptp(shares):
-                # Student's about the seeds alone would be too narrow: trials vary as well.
-                reach = abs(drawn[1] - drawn[0]) / 2
-                assert reach >= min(stats.sem(shares) * stats.norm.ppf(0.975), 0.5) - tolerance
+            interval = share_over_seeds(group.distances <= limit).ci95
+            np.testing.assert_allclose(drawn, interval, atol=PIXEL / self.SPAN)
 
 
 class TestHistogram:
