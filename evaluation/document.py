@@ -204,6 +204,23 @@ class PooledResult(Row, frozen=True, kw_only=True):
     worst_seed: WorstSeed
 
 
+class Difference(Document, frozen=True, kw_only=True):
+    """What a row of the table has less another row, in the same trials.
+
+    Parameters
+    ----------
+    policy, reference : str
+        The names of both in the table.
+    metrics : dict of Estimate
+        Differences of the figures of merit.
+    """
+
+    policy: str
+    reference: str
+    problem: str
+    metrics: dict[str, Estimate]
+
+
 class EvaluationDocument(Document, frozen=True, kw_only=True):
     """An evaluation: evaluation.json of kinarm-eval --out, and what kinarm-eval --json prints.
 
@@ -211,11 +228,14 @@ class EvaluationDocument(Document, frozen=True, kw_only=True):
     ----------
     pooled : list of PooledResult
         Training seeds of a recipe together.
+    differences : list of Difference
+        What rows have less the reference of their problem, if there is one.
     """
 
     protocol: Protocol
     results: list[Result]
     pooled: list[PooledResult]
+    differences: list[Difference]
 
     def __repr__(self) -> str:
         return f"EvaluationDocument({len(self.results)} results)"

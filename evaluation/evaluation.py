@@ -1,7 +1,7 @@
 """Put contestants to trials, and sum up how they did."""
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -14,8 +14,9 @@ from numpy.typing import NDArray
 from kinarm.episodes import Outcome, Rollouts
 from kinarm.errors import InvalidInputError
 from kinarm.evaluation.bounds import MOST_BOUNDED, oracle_bounds
-from kinarm.evaluation.contestants import Contestant, Predictor, measure_holding
+from kinarm.evaluation.contestants import ORACLE, Contestant, Predictor, measure_holding
 from kinarm.evaluation.document import (
+    Difference,
     EvaluationDocument,
     FacedProblem,
     Failures,
@@ -32,7 +33,7 @@ from kinarm.evaluation.estimates import estimate_metrics
 from kinarm.evaluation.finding import contestant_of
 from kinarm.evaluation.outcomes import Holding, Outcomes, failure_causes
 from kinarm.evaluation.predictors import Wrapper
-from kinarm.evaluation.selection import check_names, group_names
+from kinarm.evaluation.selection import check_names, group_names, is_called
 from kinarm.evaluation.statistics import Estimate
 from kinarm.evaluation.trials import TrialSet
 from kinarm.policies.oracle.oracle import OracleSolutions
@@ -55,6 +56,16 @@ class Evaluation:
     rollouts: Rollouts
     bounds: OracleSolutions | None = None
     holding: Holding | None = None
+
+    @property
+    def name(self) -> str:
+        """Name of the policy."""
+        return self.contestant.name
+
+    @property
+    def members(self) -> tuple["Evaluation", ...]:
+        """Itself, where several training seeds would be pooled."""
+        return (self,)
 
     @property
     def problem(self) -> ReachProblem:
@@ -85,6 +96,24 @@ class Evaluation:
         """Bodies that touched, per trial."""
         return self.trials.simulator.contact_pairs(self.rollouts)
 
+    def difference(self, other: "Evaluation | PooledEvaluation") -> dict[str, Estimate]:
+        """Figures of merit less those of another, by their name in `kinarm.evaluation.METRICS`.
+
+        Intervals are about other trials, which both would face, and where training seeds are pooled
+        also about other trainings.
+
+        Parameters
+        ----------
+        other : Evaluation or PooledEvaluation
+            Whose figures are subtracted.
+
+        Raises
+        ------
+        InvalidInputError
+            If it faced other trials; says what differs.
+        """
+        return _difference(self, other)
+
     @property
     def step_ratio(self) -> NDArray[np.float64]:
         """Steps taken over those proven necessary, of successful trials."""
@@ -114,7 +143,7 @@ class Evaluation:
             steps=holding.steps.tolist(),
         )
         return Result(
-            **_row(self.contestant.name, [self]),
+            **_row(self.name, [self]),
             metrics=self.metrics,
             training_seed=self.contestant.seed,
             note=self.contestant.note,
@@ -127,7 +156,7 @@ class Evaluation:
         return self.result.to_json()
 
     def __repr__(self) -> str:
-        name, problem = self.contestant.name, self.problem.name
+        name, problem = self.name, self.problem.name
         trials = f"{len(self.trials)} trials of {problem}"
         return f"Evaluation({name} on {trials}, success {self.success})"
 
@@ -148,6 +177,10 @@ class PooledEvaluation:
     def metrics(self) -> dict[str, Estimate]:
         """Figures of merit over all seeds; intervals are over seeds and trials."""
         return estimate_metrics(_outcomes(self.members))
+
+    def difference(self, other: "Evaluation | PooledEvaluation") -> dict[str, Estimate]:
+        """Figures of merit less those of another; see `Evaluation.difference`."""
+        return _difference(self, other)
 
     @property
     def worst(self) -> Evaluation:
@@ -191,6 +224,17 @@ class PooledEvaluation:
         seeds, trials = len(self.members), self.members[0].trials
         on = f"{self.name} on {len(trials)} trials of {self.problem.name}"
         return f"PooledEvaluation({seeds} seeds of {on}, success {self.metrics['success']})"
+
+
+Faced = Evaluation | PooledEvaluation
+"""What a row of the table is about."""
+
+
+def _difference(first: Faced, second: Faced) -> dict[str, Estimate]:
+    trials, others = first.members[0].trials, second.members[0].trials
+    if different := trials.first_difference(others):
+        raise InvalidInputError(f"differences need the same trials, but in the second, {different}")
+    return estimate_metrics(_outcomes(first.members), _outcomes(second.members))
 
 
 def _outcomes(members: Sequence[Evaluation]) -> Outcomes:
@@ -320,7 +364,26 @@ def pool(evaluations: Sequence[Evaluation]) -> tuple[PooledEvaluation, ...]:
     return tuple(PooledEvaluation(name, tuple(members)) for name, members in several)
 
 
-def evaluation_document(evaluations: Sequence[Evaluation], command: str) -> EvaluationDocument:
+def _differences(rows: Sequence[Faced], reference: str) -> Iterator[Difference]:
+    """What policies have less the first of their problem that a name stands for."""
+    references: dict[str, Faced] = {}
+    for row in rows:
+        if any(is_called(member.contestant, reference) for member in row.members):
+            references.setdefault(row.problem.digest, row)
+    for row in rows:
+        other = references.get(row.problem.digest, row)
+        if other is not row and row.members[0].contestant is not ORACLE:
+            yield Difference(
+                policy=row.name,
+                reference=other.name,
+                problem=row.problem.name,
+                metrics=row.difference(other),
+            )
+
+
+def evaluation_document(
+    evaluations: Sequence[Evaluation], command: str, reference: str = ""
+) -> EvaluationDocument:
     """Everything about an evaluation, to write and read again.
 
     Parameters
@@ -329,6 +392,8 @@ def evaluation_document(evaluations: Sequence[Evaluation], command: str) -> Eval
         One trial set per problem; policies and problems have distinct names.
     command : str
         The command that made them.
+    reference : str
+        Name or file of what others are compared with, if any.
     """
     check_names((each.contestant, each.problem) for each in evaluations)
     any_set = evaluations[0].trials
@@ -344,8 +409,12 @@ def evaluation_document(evaluations: Sequence[Evaluation], command: str) -> Eval
         versions=package_versions(),
         commit=source_commit(),
     )
+    pooled = pool(evaluations)
+    members = {member for group in pooled for member in group.members}
+    rows: list[Faced] = [*pooled, *(each for each in evaluations if each not in members)]
     return EvaluationDocument(
         protocol=protocol,
         results=[each.result for each in evaluations],
-        pooled=[each.result for each in pool(evaluations)],
+        pooled=[each.result for each in pooled],
+        differences=list(_differences(rows, reference)) if reference else [],
     )

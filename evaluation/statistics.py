@@ -113,7 +113,7 @@ def share_difference(first: NDArray[Any], second: NDArray[Any]) -> Estimate:
 
 
 def _weighted_mean(terms: Terms) -> float:
-    return sum(weight * float(values.mean()) for weight, values in terms)
+    return float(sum(weight * values.mean() for weight, values in terms))
 
 
 def _crossed_reach(terms: Terms) -> float:

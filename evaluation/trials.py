@@ -96,13 +96,27 @@ class TrialSet:
         """The problem that is faced."""
         return self.simulator.problem
 
+    @property
+    def rules(self) -> ReachProblem:
+        """The problem without its reward, by which trials do not differ."""
+        return self.problem.replace(reward=RewardWeights())
+
     @cached_property
     def digest(self) -> str:
         """Hash of starts, goals and problem, without its reward."""
         numbers = np.round(np.concatenate([self.starts, self.goals], axis=1), 12) + 0.0
-        rules = self.problem.replace(reward=RewardWeights())
-        content = rules.digest.encode() + numbers.tobytes()
+        content = self.rules.digest.encode() + numbers.tobytes()
         return hashlib.sha256(content).hexdigest()[:16]
+
+    def first_difference(self, other: "TrialSet") -> str | None:
+        """Say what sets another set apart, such as ``"seed is 1, not 0"``; None if nothing does."""
+        if self.digest == other.digest:
+            return None
+        if different := self.rules.first_difference(other.rules):
+            return different
+        if self.seed != other.seed:
+            return f"seed is {other.seed}, not {self.seed}"
+        return f"there are {len(other)} trials, not {len(self)}"
 
 
 trial_set = cache(TrialSet.draw)

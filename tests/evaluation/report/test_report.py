@@ -154,7 +154,13 @@ class TestPage:
             assert entry["trial_set_hash"] in told
         for package, version in protocol["versions"].items():
             assert f"{package} {version}" in told
-        for words in (protocol["commit"], "mid-P", "Student", "percentile bootstrap", "1000 resamples"):
+        for words in (
+            protocol["commit"],
+            "mid-P",
+            "Student",
+            "percentile bootstrap",
+            "1000 resamples",
+        ):
             assert words in told
 
     def test_nothing_points_outside(self, page):
