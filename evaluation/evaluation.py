@@ -370,7 +370,7 @@ def _differences(rows: Sequence[Faced], reference: str) -> Iterator[Difference]:
     for row in rows:
         if any(is_called(member.contestant, reference) for member in row.members):
             references.setdefault(row.problem.digest, row)
-    for row in rows:
+    for row in sorted(rows, key=lambda row: -(row.metrics["success"].value or 0.0)):
         other = references.get(row.problem.digest, row)
         if other is not row and row.members[0].contestant is not ORACLE:
             yield Difference(

@@ -1,11 +1,12 @@
 """The table of an evaluation, for terminals, Markdown, CSV and reports."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
+from functools import partial
 from operator import attrgetter
-from typing import TYPE_CHECKING, NamedTuple, TypeVar
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
 from kinarm._tables import ALWAYS, CHOOSE, Column, print_columns, print_markdown
-from kinarm.evaluation.document import EvaluationDocument, PooledResult, Row
+from kinarm.evaluation.document import Difference, EvaluationDocument, PooledResult, Row
 from kinarm.evaluation.metrics import METRICS
 from kinarm.evaluation.statistics import Estimate
 
@@ -54,6 +55,32 @@ def metric_column(name: str, estimates: Callable[[T], Mapping[str, Estimate]]) -
     heading = metric.heading or f"{name.replace('_', ' ')} {metric.unit}".rstrip()
     priority = metric.priority if metric.heading else ON_REQUEST
     return Column(heading, cell, name, metric.meaning, priority, values)
+
+
+def difference_columns(rows: Sequence[Difference], names: Collection[str]) -> list[Column[Any]]:
+    """Labels, and figures of some names, where a row has an interval of one."""
+    references = {row.reference for row in rows}
+    alone = len(references) == 1
+
+    def label(row: Difference) -> str:
+        return row.policy if alone else f"{row.policy} less {row.reference}"
+
+    def figure(name: str, row: Difference) -> Cell:
+        value, ci95 = row.metrics[name].value, row.metrics[name].ci95
+        if value is None or ci95 is None:
+            return Cell()
+        return Cell(METRICS[name].write(value, "+"), METRICS[name].write_range(*ci95, "+"))
+
+    figures = [
+        Column(each.heading, partial(figure, name), name, each.meaning, each.priority)
+        for name, each in METRICS.items()
+        if name in names and each.heading
+    ]
+    return [
+        Column("problem", attrgetter("problem"), priority=ALWAYS, words=True),
+        Column(f"less {references.pop()}" if alone else "less", label, priority=ALWAYS, words=True),
+        *(each for each in figures if any(str(each.cell(row)) for row in rows)),
+    ]
 
 
 def spread_column(name: str) -> Column[Row]:
@@ -150,6 +177,16 @@ def print_table(
         print_markdown(shown, rows, console)
     else:
         print_columns(shown, groups, console, whole=bool(columns), advice=CHOOSE)
+    if rows := document.differences:
+        names = [column.name for column in columns] or [
+            name for name, each in METRICS.items() if each.shows_interval or markdown
+        ]
+        less = difference_columns(rows, names)
+        console.print()
+        if markdown:
+            print_markdown(less, rows, console)
+        else:
+            print_columns(less, [rows], console, whole=bool(columns), advice=CHOOSE)
 
 
 def table_rows(document: EvaluationDocument, problem: str) -> list[Row]:

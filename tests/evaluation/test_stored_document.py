@@ -87,7 +87,7 @@ class TestChoosing:
             SimpleNamespace(policy="a", problem="left", members=["a-seed0", "a-seed1"]),
             SimpleNamespace(policy="a", problem="right", members=["a-seed0"]),
         ]
-        return EvaluationDocument(protocol=None, results=rows, pooled=pooled)
+        return EvaluationDocument(protocol=None, results=rows, pooled=pooled, differences=[])
 
     def test_by_name_and_by_group(self, document):
         assert document.result("a-seed1", "left").policy == "a-seed1"

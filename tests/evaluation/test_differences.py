@@ -1,0 +1,82 @@
+"""Policies less another in the same trials: figures, intervals, and trials that differ."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from kinarm.errors import InvalidInputError
+from kinarm.evaluation.evaluation import evaluate, evaluation_document, pool
+from kinarm.evaluation.metrics import METRICS
+from kinarm.evaluation.statistics import share_difference
+from kinarm.task import RewardWeights
+
+
+def test_figures_are_subtracted_and_intervals_are_of_the_same_trials(evaluations):
+    skilled, zero = evaluations[1], evaluations[3]
+    found = skilled.difference(zero)
+    assert list(found) == list(METRICS)
+    for name in ("success", "collision", "mean_distance", "p95_distance", "mean_steps"):
+        expected = skilled.metrics[name].value - zero.metrics[name].value
+        assert found[name].value == pytest.approx(expected), name
+    hits = [each.rollouts.success[None] for each in (skilled, zero)]
+    assert found["success"] == share_difference(*hits)
+    assert found["mean_steps"].ci95 is None
+    other_way = zero.difference(skilled)
+    for name in ("success", "mean_distance", "median_distance"):
+        low, high = found[name].ci95
+        assert low <= found[name].value <= high
+        assert other_way[name].ci95 == pytest.approx((-high, -low), rel=1e-3)
+
+
+def test_recipes_are_compared_over_seeds_and_trials(evaluations):
+    (group,), one = pool(evaluations), evaluations[3]
+    found = group.difference(one)
+    hits = np.array([member.rollouts.success for member in group.members])
+    assert found["success"] == share_difference(hits, one.rollouts.success[None])
+    alone = group.members[1].difference(one)
+    assert np.diff(found["mean_distance"].ci95) > np.diff(alone["mean_distance"].ci95)
+
+
+@pytest.mark.parametrize(
+    ("changed", "told"),
+    [
+        ({"problem": "left"}, "task.goal_regions.*left.*right"),
+        ({"tolerance": 0.03}, "task.tolerance is 0.03, not 0.05"),
+        ({"seed": 1}, "seed is 1, not 0"),
+        ({"trials": 6}, "there are 6 trials, not 5"),
+    ],
+)
+def test_other_trials_are_refused_by_what_differs(changed, told):
+    asked = {"problem": "right", "trials": 5, "seed": 0}
+    first, second = (evaluate("zero", **each) for each in (asked, {**asked, **changed}))
+    with pytest.raises(InvalidInputError, match=f"same trials, but in the second, {told}"):
+        first.difference(second)
+
+
+def test_a_reward_makes_no_other_trials():
+    first, second = (
+        evaluate("zero", "right", trials=3, **each)
+        for each in ({}, {"reward": RewardWeights(success=9)})
+    )
+    assert first.problem.digest != second.problem.digest
+    assert first.difference(second)["success"].value == 0
+
+
+def test_documents_hold_what_rows_have_less_the_reference(evaluations):
+    document = evaluation_document(evaluations, "", "zero")
+    (row,) = document.differences
+    assert (row.policy, row.reference, row.problem) == ("made-right", "zero", "right")
+    assert row.metrics == pool(evaluations)[0].difference(evaluations[3])
+    (row,) = evaluation_document(evaluations, "", "made-right-seed2").differences
+    assert (row.policy, row.reference) == ("zero", "made-right")
+    assert not evaluation_document(evaluations, "").differences
+
+
+def test_the_oracle_is_no_policy_that_is_compared(evaluations):
+    oracle = evaluate("oracle", "right", trials=60, seed=5)
+    compared = [*evaluations[1:4], oracle]
+    document = evaluation_document(compared, "", "zero")
+    assert [row.policy for row in document.differences] == ["made-right"]
+    against = evaluation_document([replace(oracle), evaluations[3]], "", "oracle").differences
+    assert [(row.policy, row.reference) for row in against] == [("zero", "oracle")]
