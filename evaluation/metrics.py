@@ -71,13 +71,13 @@ class Metric:
     spread_heading: str = ""
     priority: float = 0
 
-    def write(self, value: float, sign: str = "") -> str:
+    def write(self, value: float, *, sign: str = "") -> str:
         """A value of the metric as text; sign ``"+"`` also for positive ones."""
         return f"{100 * value if self.unit == '%' else value:{sign}.{self.digits}f}"
 
-    def write_range(self, low: float, high: float, sign: str = "") -> str:
+    def write_range(self, low: float, high: float, *, sign: str = "") -> str:
         """A range of values as text."""
-        return f"{self.write(low, sign)}..{self.write(high, sign)}"
+        return f"{self.write(low, sign=sign)}..{self.write(high, sign=sign)}"
 
 
 def _share_of(

@@ -113,7 +113,7 @@ def share_difference(first: NDArray[Any], second: NDArray[Any]) -> Estimate:
 
 
 def _weighted_mean(terms: Terms) -> float:
-    return float(sum(weight * values.mean() for weight, values in terms))
+    return sum(weight * float(values.mean()) for weight, values in terms)
 
 
 def _crossed_reach(terms: Terms) -> float:
@@ -129,9 +129,9 @@ def _crossed_reach(terms: Terms) -> float:
         seeds, trials = values.shape
         if seeds > 1:
             each = values.mean(axis=1)
-            squares += weight**2 * float(squared_reach(each))
+            squares += weight * weight * float(squared_reach(each))
             rest = values - each[:, None] - values.mean(axis=0) + values.mean()
-            noise += weight**2 * float((rest**2).sum()) / (seeds * (seeds - 1) * (trials - 1))
+            noise += weight * weight * float((rest**2).sum()) / (seeds * (seeds - 1) * (trials - 1))
     beyond = float(squared_reach(of_trials)) - student(trials) ** 2 * noise / trials
     return squares + max(beyond, 0.0)
 

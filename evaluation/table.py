@@ -69,7 +69,9 @@ def difference_columns(rows: Sequence[Difference], names: Collection[str]) -> li
         value, ci95 = row.metrics[name].value, row.metrics[name].ci95
         if value is None or ci95 is None:
             return Cell()
-        return Cell(METRICS[name].write(value, "+"), METRICS[name].write_range(*ci95, "+"))
+        return Cell(
+            METRICS[name].write(value, sign="+"), METRICS[name].write_range(*ci95, sign="+")
+        )
 
     figures = [
         Column(each.heading, partial(figure, name), name, each.meaning, each.priority)
@@ -177,16 +179,16 @@ def print_table(
         print_markdown(shown, rows, console)
     else:
         print_columns(shown, groups, console, whole=bool(columns), advice=CHOOSE)
-    if rows := document.differences:
+    if differences := document.differences:
         names = [column.name for column in columns] or [
             name for name, each in METRICS.items() if each.shows_interval or markdown
         ]
-        less = difference_columns(rows, names)
+        less = difference_columns(differences, names)
         console.print()
         if markdown:
-            print_markdown(less, rows, console)
+            print_markdown(less, differences, console)
         else:
-            print_columns(less, [rows], console, whole=bool(columns), advice=CHOOSE)
+            print_columns(less, [differences], console, whole=bool(columns), advice=CHOOSE)
 
 
 def table_rows(document: EvaluationDocument, problem: str) -> list[Row]:

@@ -1,4 +1,7 @@
-"""The script of transfer comes to the figures that version 1.0.0 recorded, to the last bit."""
+"""The script of transfer comes to the figures that version 1.0.0 recorded, to the last bit.
+
+Intervals are of a later kind.
+"""
 
 import json
 from pathlib import Path
