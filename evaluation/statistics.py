@@ -133,7 +133,7 @@ def _crossed_reach(terms: Terms) -> float:
             rest = values - each[:, None] - values.mean(axis=0) + values.mean()
             noise += weight * weight * float((rest**2).sum()) / (seeds * (seeds - 1) * (trials - 1))
     beyond = float(squared_reach(of_trials)) - student(trials) ** 2 * noise / trials
-    return squares + max(beyond, 0.0)
+    return float(squares + max(beyond, 0.0))
 
 
 def squared_reach(values: NDArray[np.float64]) -> NDArray[np.float64]:
