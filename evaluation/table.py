@@ -1,9 +1,8 @@
 """The table of an evaluation, for terminals, Markdown, CSV and reports."""
 
 from collections.abc import Callable, Collection, Mapping, Sequence
-from functools import partial
 from operator import attrgetter
-from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
+from typing import TYPE_CHECKING, NamedTuple, TypeVar
 
 from kinarm._tables import ALWAYS, CHOOSE, Column, print_columns, print_markdown
 from kinarm.evaluation.document import Difference, EvaluationDocument, PooledResult, Row
@@ -57,26 +56,29 @@ def metric_column(name: str, estimates: Callable[[T], Mapping[str, Estimate]]) -
     return Column(heading, cell, name, metric.meaning, priority, values)
 
 
-def difference_columns(rows: Sequence[Difference], names: Collection[str]) -> list[Column[Any]]:
-    """Labels, and figures of some names, where a row has an interval of one."""
+def difference_cell(name: str, difference: Estimate) -> Cell:
+    """A metric's difference with its sign, and its interval; empty without one."""
+    value, ci95 = difference.value, difference.ci95
+    if value is None or ci95 is None:
+        return Cell()
+    return Cell(METRICS[name].write(value, sign="+"), METRICS[name].write_range(*ci95, sign="+"))
+
+
+def difference_columns(
+    rows: Sequence[Difference], names: Collection[str] = ()
+) -> list[Column[Difference]]:
+    """Labels, and what rows know of some figures, or of those that tables show with intervals."""
     references = {row.reference for row in rows}
     alone = len(references) == 1
 
     def label(row: Difference) -> str:
         return row.policy if alone else f"{row.policy} less {row.reference}"
 
-    def figure(name: str, row: Difference) -> Cell:
-        value, ci95 = row.metrics[name].value, row.metrics[name].ci95
-        if value is None or ci95 is None:
-            return Cell()
-        return Cell(
-            METRICS[name].write(value, sign="+"), METRICS[name].write_range(*ci95, sign="+")
-        )
-
-    figures = [
-        Column(each.heading, partial(figure, name), name, each.meaning, each.priority)
+    figures: list[Column[Difference]] = [
+        Column(each.heading, cell, name, each.meaning, each.priority)
         for name, each in METRICS.items()
-        if name in names and each.heading
+        if each.heading and (name in names if names else each.shows_interval)
+        for cell in [lambda row, name=name: difference_cell(name, row.metrics[name])]
     ]
     return [
         Column("problem", attrgetter("problem"), priority=ALWAYS, words=True),
@@ -180,9 +182,7 @@ def print_table(
     else:
         print_columns(shown, groups, console, whole=bool(columns), advice=CHOOSE)
     if differences := document.differences:
-        names = [column.name for column in columns] or [
-            name for name, each in METRICS.items() if each.shows_interval or markdown
-        ]
+        names = METRICS if markdown and not columns else [column.name for column in columns]
         less = difference_columns(differences, names)
         console.print()
         if markdown:

@@ -17,7 +17,6 @@ from kinarm.evaluation.experiments import table
 from kinarm.evaluation.experiments.plan import Run
 from kinarm.evaluation.experiments.table import Group, identity, shorter, shown
 from kinarm.evaluation.figures import COLOURS, panels_figure, save_figure
-from kinarm.evaluation.metrics import METRICS
 from kinarm.evaluation.report.templating import markdown_table, template_environment
 from kinarm.evaluation.statistics import Estimate, share_over_seeds
 from kinarm.policies.provenance import package_versions, source_commit
@@ -136,7 +135,7 @@ def _page(name: str, study: "Study", document: dict[str, Any], drawings: Mapping
             (each.title or each.name, each.source) for each in experiment.entries if each.source
         ],
         text=tomli_w.dumps(experiment.to_json()),
-        meanings=[(METRICS[name].heading or name, METRICS[name].meaning) for name in table.FIGURES],
+        meanings=[(each.heading, each.meaning) for each in table.COLUMNS if each.meaning],
         markdown_table=markdown_table,
     )
 

@@ -256,7 +256,7 @@ class Study:
         for run in self.finished:
             config = {k: v for k, v in run.settings["config"].items() if k != "seed"}
             shared.setdefault((run.entry.name, repr((run.learner, config))), []).append(run)
-        return tuple(
+        groups = [
             Group(
                 label=self._label(runs[0]),
                 entry=runs[0].entry,
@@ -266,6 +266,14 @@ class Study:
                 bounds=self.bounds.get(runs[0].config.problem.digest),
             )
             for runs in shared.values()
+        ]
+        first: dict[str, Group] = {}
+        for group in groups:
+            first.setdefault(group.config.problem.digest, group)
+        firsts = (first[group.config.problem.digest] for group in groups)
+        return tuple(
+            group if group is other else replace(group, first=other)
+            for group, other in zip(groups, firsts, strict=True)
         )
 
     def best(self, count: int = 1) -> tuple[Group, ...]:

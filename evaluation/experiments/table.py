@@ -16,8 +16,8 @@ from kinarm.evaluation.experiments.plan import Run
 from kinarm.evaluation.experiments.runs import TrainedRun
 from kinarm.evaluation.metrics import METRICS
 from kinarm.evaluation.outcomes import Outcomes
-from kinarm.evaluation.statistics import Estimate, share_over_seeds
-from kinarm.evaluation.table import SEEDS_PRIORITY, metric_column
+from kinarm.evaluation.statistics import Estimate, share_difference, share_over_seeds
+from kinarm.evaluation.table import SEEDS_PRIORITY, difference_cell, metric_column
 from kinarm.policies.config import TrainingConfig
 from kinarm.policies.oracle import OracleSolutions
 
@@ -44,6 +44,8 @@ class Group:
         The trainings by seed.
     bounds : OracleSolutions or None
         What the oracle knows about their trials.
+    first : Group, optional
+        The first group of the same problem, with which this one is compared.
     """
 
     label: str
@@ -52,6 +54,7 @@ class Group:
     choices: Mapping[str, Any]
     runs: tuple[TrainedRun, ...]
     bounds: OracleSolutions | None
+    first: "Group | None" = None
 
     @cached_property
     def hits(self) -> NDArray[np.bool_]:
@@ -62,6 +65,13 @@ class Group:
     def success(self) -> Estimate:
         """Share of successful trials, and its 95 % interval over seeds and trials."""
         return share_over_seeds(self.hits)
+
+    @cached_property
+    def difference(self) -> Estimate:
+        """Success less that of the first group, in the same trials; unknown of the first itself."""
+        return (
+            Estimate(None) if self.first is None else share_difference(self.hits, self.first.hits)
+        )
 
     @cached_property
     def reachable(self) -> float:
@@ -167,6 +177,24 @@ def _estimates(group: Group) -> dict[str, Estimate]:
     return {**known, "success": group.success}
 
 
+def _difference_column() -> Column[Group]:
+    """The column of the difference to the first group."""
+
+    def values(group: Group) -> dict[str, float | None]:
+        ends = zip(("difference_low", "difference_high"), group.difference.ci95 or (), strict=False)
+        return {"difference": group.difference.value, **dict(ends)}
+
+    meaning = "success less that of the first trainings of the problem, in the same trials"
+    return Column(
+        "less first %",
+        lambda group: difference_cell("success", group.difference),
+        "difference",
+        meaning,
+        priority=9.5,
+        values=values,
+    )
+
+
 def _until_column(level: float) -> Column[Group]:
     """Environment steps [thousands] and processor time [min] to a success level."""
     name = f"until_{100 * level:.0f}"
@@ -210,7 +238,9 @@ COLUMNS: tuple[Column[Group], ...] = (
         words=True,
     ),
     Column("seeds", lambda group: len(group.runs), priority=SEEDS_PRIORITY),
-    *(metric_column(name, _estimates) for name in FIGURES),
+    *(metric_column(name, _estimates) for name in FIGURES[:1]),
+    _difference_column(),
+    *(metric_column(name, _estimates) for name in FIGURES[1:]),
     _number_column("worst seed %", "worst_seed", attrgetter("worst_seed"), 0.01, 10.5),
     _number_column("million steps", "environment_steps", attrgetter("environment_steps"), 1e6, 9),
     _number_column("minutes", "processor_seconds", attrgetter("processor_seconds"), 60, 9),
@@ -251,6 +281,8 @@ def group_entries(group: Group) -> dict[str, Any]:
         "choices": dict(group.choices),
         "seeds": len(group.runs),
         "success": group.success.to_json(),
+        "difference": group.first
+        and {"first": group.first.label, "success": group.difference.to_json()},
         "collision": share_over_seeds(touched).to_json(),
         "success_each": group.hits.mean(axis=1).tolist(),
         "median_distance": float(np.mean([run.last.median_distance for run in group.runs])),

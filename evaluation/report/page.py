@@ -15,6 +15,7 @@ from kinarm.evaluation.report.templating import template_environment
 from kinarm.evaluation.table import (
     REPLACED,
     SPREAD_PRIORITY,
+    difference_columns,
     has_star,
     metric_column,
     metric_columns,
@@ -72,6 +73,8 @@ def report_page(document: EvaluationDocument, evaluations: Sequence[Evaluation])
     return environment.get_template("page.html").render(
         protocol=document.protocol,
         problems=problems,
+        differences=document.differences,
+        difference_columns=difference_columns,
         columns=metric_columns(),
         shown_columns=partial(telling_columns, priority=SPREAD_PRIORITY),
         worst=list(zip(problems, chosen, strict=True)),
