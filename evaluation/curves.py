@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from kinarm._files import reading
 from kinarm.errors import InvalidInputError
 from kinarm.evaluation.figures import COLOURS, DASHES, panels_figure
-from kinarm.evaluation.statistics import LEVEL
+from kinarm.evaluation.statistics import squared_reach
 from kinarm.policies.library import group_of
 
 if TYPE_CHECKING:
@@ -44,16 +44,12 @@ class Band(NamedTuple):
         The points are those of the curve with the fewest, from where all have begun to where the
         first one ends; others are interpolated linearly. A single seed has no interval.
         """
-        from scipy.special import stdtrit
-
         seeds, coarsest = len(curves), min((x for x, _ in curves), key=len)
         first, last = max(x[0] for x, _ in curves), min(x[-1] for x, _ in curves)
         places = np.unique(coarsest.clip(first, max(first, last)))
         heights = np.array([np.interp(places, x, y) for x, y in curves])
-        mean, reach = heights.mean(axis=0), np.zeros(len(places))
-        if seeds > 1:
-            errors = heights.std(axis=0, ddof=1) / seeds**0.5
-            reach = stdtrit(seeds - 1, (1 + LEVEL) / 2) * errors
+        mean = heights.mean(axis=0)
+        reach = np.sqrt(squared_reach(heights)) if seeds > 1 else 0.0
         ends = np.array([mean - reach, mean + reach])
         return cls(seeds, places, mean, *(ends.clip(0, 1) if shares else ends))
 

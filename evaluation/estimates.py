@@ -75,9 +75,9 @@ def _of_means(sides: Sequence[Outcomes], known: Mapping[str, Metric]) -> dict[st
     ]
     intervals = {}
     for name, metric in known.items():
-        if metric.interval in ("share", "mean"):
+        if metric.interval in ("mid-P", "Student"):
             values = [np.array([metric.formula(seed) for seed in seeds]) for seeds in alone]
-            if metric.interval == "mean":
+            if metric.interval == "Student":
                 intervals[name] = mean_interval(*values)
             else:
                 of_shares = share_over_seeds if len(values) == 1 else share_difference
@@ -108,15 +108,16 @@ def _bootstrapped(
         ],
         axis=-1,
     )
-    squares = [
-        squared_reach(np.array([figures(side.of_seed(seed)) for seed in range(len(side.rollouts))]))
+    of_seeds = [
+        np.array([figures(side.of_seed(seed)) for seed in range(len(side.rollouts))])
         for side in sides
         if len(side.rollouts) > 1
     ]
-    if not squares:
+    if not of_seeds:
         return dict(zip(formulas, map(percentile_interval, found), strict=True))
-    squares.append(student(trials) ** 2 * found.var(axis=-1, ddof=1))
-    middles, reaches = _less([figures(side) for side in sides]), np.sqrt(sum(squares))
+    of_trials = student(trials) ** 2 * found.var(axis=-1, ddof=1)
+    reaches = np.sqrt(squared_reach(*of_seeds) + of_trials)
+    middles = _less([figures(side) for side in sides])
     ends = np.stack([middles - reaches, middles + reaches], axis=-1).tolist()
     return {name: (low, high) for name, (low, high) in zip(formulas, ends, strict=True)}
 

@@ -40,9 +40,9 @@ class Metric:
         works along the last axis of many resamples.
     unit : str
         ``"%"`` for shares, kept as fractions and shown in per cent.
-    interval : ``"share"``, ``"mean"``, ``"bootstrap"`` or None
-        How its 95 % interval is made. For shares and means over trials, the
-        formula also gets each trial by itself.
+    interval : ``"mid-P"``, ``"Student"``, ``"bootstrap"`` or None
+        How its 95 % interval is made. The first two are for shares and means
+        of trials; the formula also gets each trial by itself.
     needs_bounds, needs_holding : bool
         Whether it needs the oracle, or trials that go on after success.
     heading, spread_heading : str
@@ -61,7 +61,7 @@ class Metric:
     definition: str
     formula: Callable[[Outcomes], Any]
     unit: str = ""
-    interval: Literal["share", "mean", "bootstrap"] | None = None
+    interval: Literal["mid-P", "Student", "bootstrap"] | None = None
     needs_bounds: bool = False
     needs_holding: bool = False
     heading: str = ""
@@ -89,7 +89,7 @@ def _share_of(
         definition=definition,
         formula=lambda trials: hits(trials).mean(axis=-1),
         unit="%",
-        interval="share",
+        interval="mid-P",
         digits=1,
         **shown,
     )
@@ -165,7 +165,7 @@ METRICS: dict[str, Metric] = {
     "mean_distance": _distance(
         meaning=f"mean of the {FINAL}",
         definition="Σ dᵢ / n",
-        interval="mean",
+        interval="Student",
         formula=lambda trials: trials.distance.mean(axis=-1),
         heading="mean distance m",
         priority=2,

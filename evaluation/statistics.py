@@ -119,27 +119,38 @@ def _weighted_mean(terms: Terms) -> float:
 def _crossed_reach(terms: Terms) -> float:
     """Square of the half width of an interval over seeds and trials.
 
-    It is the sum of Student's for the seeds of each term, with their own degrees of freedom
-    (Banerjee 1960), and for the trials. Either contains the interaction of seed and trial; that of
-    the trials is taken without it.
+    It is that of Student's interval for the seeds, and for the trials with their own degrees of
+    freedom (Banerjee 1960). Either contains the interaction of seed and trial; that of the trials
+    is taken without it.
     """
-    squares, noise = 0.0, 0.0
     of_trials = np.sum([weight * values.mean(axis=0) for weight, values in terms], axis=0)
+    of_seeds, noise = [], 0.0
     for weight, values in terms:
         seeds, trials = values.shape
         if seeds > 1:
             each = values.mean(axis=1)
-            squares += weight * weight * float(squared_reach(each))
+            of_seeds.append(weight * each)
             rest = values - each[:, None] - values.mean(axis=0) + values.mean()
             noise += weight * weight * float((rest**2).sum()) / (seeds * (seeds - 1) * (trials - 1))
-    beyond = float(squared_reach(of_trials)) - student(trials) ** 2 * noise / trials
-    return float(squares + max(beyond, 0.0))
+    beyond = squared_reach(of_trials) - student(len(of_trials)) ** 2 * noise / len(of_trials)
+    return float(np.maximum(beyond, 0) + (squared_reach(*of_seeds) if of_seeds else 0))
 
 
-def squared_reach(values: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Square of half of Student's interval for the mean of independent values, shape (n, ...)."""
-    square: NDArray[np.float64] = values.var(axis=0, ddof=1) / len(values)
-    return student(len(values)) ** 2 * square
+def squared_reach(*samples: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Square of half of Student's interval for a sum of means of independent values.
+
+    Samples have shape (n, ...); degrees of freedom are those of Welch and Satterthwaite.
+    """
+    from scipy.special import stdtrit
+
+    variances = [values.var(axis=0, ddof=1) / len(values) for values in samples]
+    total = np.sum(variances, axis=0)
+    spread = sum(
+        each**2 / (len(values) - 1) for each, values in zip(variances, samples, strict=True)
+    )
+    freedom = np.divide(total**2, spread, out=np.ones_like(total), where=spread > 0)
+    square: NDArray[np.float64] = stdtrit(freedom, (1 + LEVEL) / 2) ** 2 * total
+    return square
 
 
 @lru_cache(maxsize=32)

@@ -222,8 +222,8 @@ class TransferResults:
 def ratio_of_means(first: NDArray[np.float64], second: NDArray[np.float64]) -> Estimate:
     """Ratio of geometric means of independent numbers, and its 95 % interval.
 
-    The interval is that of the difference of mean logarithms, whose reach is those of either mean
-    added as squares (Banerjee 1960). There is no ratio where a number is zero or infinite.
+    The interval is Student's for the difference of mean logarithms, with the degrees of freedom
+    of Welch and Satterthwaite. There is no ratio where a number is zero or infinite.
     """
     logarithms = [np.log(each) for each in (first, second) if (each > 0).all()]
     if len(logarithms) < 2 or not all(np.isfinite(each).all() for each in logarithms):
@@ -231,5 +231,5 @@ def ratio_of_means(first: NDArray[np.float64], second: NDArray[np.float64]) -> E
     value = float(logarithms[0].mean() - logarithms[1].mean())
     if min(map(len, logarithms)) < 2:
         return Estimate(math.exp(value))
-    reach = math.sqrt(sum(float(squared_reach(each)) for each in logarithms))
+    reach = math.sqrt(squared_reach(*logarithms))
     return Estimate(math.exp(value), (math.exp(value - reach), math.exp(value + reach)))

@@ -114,7 +114,7 @@ def test_a_new_metric_is_one_entry(evaluations, monkeypatch):
         definition="|{i : dᵢ ≤ 0.5 m}| / n",
         formula=lambda trials: (trials.distance <= 0.5).mean(axis=-1),
         unit="%",
-        interval="share",
+        interval="mid-P",
         heading="within 0.5 m %",
         digits=1,
         spread_heading="spread of it %",

@@ -16,7 +16,8 @@ from kinarm.evaluation.experiments.page import (
     write_all,
 )
 from kinarm.evaluation.experiments.study import Study
-from kinarm.evaluation.experiments.table import group_row
+from kinarm.evaluation.experiments.table import group_entries, group_row
+from kinarm.evaluation.statistics import Estimate, share_difference
 
 
 class TestTable:
@@ -65,6 +66,15 @@ class TestGroups:
         for group in groups:
             assert group.success.value == group.hits.mean()
             assert group.figures["success"] == group.hits.mean()
+
+    def test_each_is_compared_with_the_first(self, finished):
+        first, second = finished.groups()
+        assert first.difference == Estimate(None)
+        assert second.difference == share_difference(second.hits, first.hits)
+        alone, compared = map(group_entries, (first, second))
+        assert alone["difference"] is None
+        assert compared["difference"]["first"] == first.label
+        assert compared["difference"]["success"] == second.difference.to_json()
 
     def test_the_best_comes_first(self, finished):
         best = finished.best(2)
