@@ -1,11 +1,11 @@
-"""Put contestants to trials, and sum up how they did."""
+"""Put contestants to trials."""
 
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import msgspec
 import numpy as np
@@ -14,33 +14,26 @@ from numpy.typing import NDArray
 from kinarm.episodes import Outcome, Rollouts
 from kinarm.errors import InvalidInputError
 from kinarm.evaluation.bounds import MOST_BOUNDED, oracle_bounds
-from kinarm.evaluation.contestants import ORACLE, Contestant, Predictor, measure_holding
+from kinarm.evaluation.contestants import Contestant, Predictor, measure_holding
 from kinarm.evaluation.document import (
-    Difference,
-    EvaluationDocument,
-    FacedProblem,
     Failures,
-    Intervals,
-    PooledResult,
-    Protocol,
     Result,
-    Spread,
     TrialEnds,
     TrialHolding,
-    WorstSeed,
 )
 from kinarm.evaluation.estimates import estimate_metrics
 from kinarm.evaluation.finding import contestant_of
 from kinarm.evaluation.outcomes import Holding, Outcomes, failure_causes
 from kinarm.evaluation.predictors import Wrapper
-from kinarm.evaluation.selection import check_names, group_names, is_called
 from kinarm.evaluation.statistics import Estimate
 from kinarm.evaluation.trials import TrialSet
 from kinarm.policies.oracle.oracle import OracleSolutions
 from kinarm.policies.policy import Policy
-from kinarm.policies.provenance import package_versions, source_commit
 from kinarm.problem import ProblemLike, ReachProblem
 from kinarm.simulator import PolicyFunction
+
+if TYPE_CHECKING:
+    from kinarm.evaluation.summary import Faced
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,7 +68,7 @@ class Evaluation:
     @cached_property
     def metrics(self) -> dict[str, Estimate]:
         """Figures of merit by their name in `kinarm.evaluation.METRICS`."""
-        return estimate_metrics(_outcomes((self,)))
+        return estimate_metrics(outcomes_of((self,)))
 
     @property
     def success(self) -> Estimate:
@@ -96,7 +89,7 @@ class Evaluation:
         """Bodies that touched, per trial."""
         return self.trials.simulator.contact_pairs(self.rollouts)
 
-    def difference(self, other: "Evaluation | PooledEvaluation") -> dict[str, Estimate]:
+    def difference(self, other: "Faced") -> dict[str, Estimate]:
         """Figures of merit less those of another, by their name in `kinarm.evaluation.METRICS`.
 
         Intervals are about other trials, which both would face, and where training seeds are pooled
@@ -112,12 +105,12 @@ class Evaluation:
         InvalidInputError
             If it faced other trials; says what differs.
         """
-        return _difference(self, other)
+        return difference_between(self, other)
 
     @property
     def step_ratio(self) -> NDArray[np.float64]:
         """Steps taken over those proven necessary, of successful trials."""
-        return _outcomes((self,)).step_ratio
+        return outcomes_of((self,)).step_ratio
 
     @property
     def outcomes(self) -> tuple[Outcome, ...]:
@@ -143,7 +136,7 @@ class Evaluation:
             steps=holding.steps.tolist(),
         )
         return Result(
-            **_row(self.name, [self]),
+            **common_figures(self.name, [self]),
             metrics=self.metrics,
             training_seed=self.contestant.seed,
             note=self.contestant.note,
@@ -161,83 +154,15 @@ class Evaluation:
         return f"Evaluation({name} on {trials}, success {self.success})"
 
 
-@dataclass(frozen=True, eq=False)
-class PooledEvaluation:
-    """How several training seeds of one recipe did on the same trials."""
-
-    name: str
-    members: tuple[Evaluation, ...]
-
-    @property
-    def problem(self) -> ReachProblem:
-        """The problem that was faced."""
-        return self.members[0].problem
-
-    @cached_property
-    def metrics(self) -> dict[str, Estimate]:
-        """Figures of merit over all seeds; intervals are over seeds and trials."""
-        return estimate_metrics(_outcomes(self.members))
-
-    def difference(self, other: "Evaluation | PooledEvaluation") -> dict[str, Estimate]:
-        """Figures of merit less those of another; see `Evaluation.difference`."""
-        return _difference(self, other)
-
-    @property
-    def worst(self) -> Evaluation:
-        """The training seed with the lowest success."""
-        return min(self.members, key=lambda member: int(member.rollouts.success.sum()))
-
-    @property
-    def spread(self) -> dict[str, Spread]:
-        """How the metrics that all seeds have vary over the seeds."""
-        spread = {}
-        for name in self.metrics:
-            known = [member.metrics[name].value for member in self.members]
-            each = [value for value in known if value is not None]
-            if len(each) == len(known):
-                std = float(np.std(each, ddof=1))
-                spread[name] = Spread(min=min(each), max=max(each), std=std, each=each)
-        return spread
-
-    @property
-    def result(self) -> PooledResult:
-        """Figures of merit over all seeds, for a document."""
-        worst = self.worst
-        return PooledResult(
-            **_row(self.name, self.members),
-            metrics=self.metrics,
-            members=[member.contestant.name for member in self.members],
-            training_seeds=[member.contestant.seed for member in self.members],
-            spread=self.spread,
-            worst_seed=WorstSeed(
-                policy=worst.contestant.name,
-                training_seed=worst.contestant.seed,
-                success=worst.success,
-            ),
-        )
-
-    def to_json(self) -> dict[str, Any]:
-        """Figures of merit as JSON holds them."""
-        return self.result.to_json()
-
-    def __repr__(self) -> str:
-        seeds, trials = len(self.members), self.members[0].trials
-        on = f"{self.name} on {len(trials)} trials of {self.problem.name}"
-        return f"PooledEvaluation({seeds} seeds of {on}, success {self.metrics['success']})"
-
-
-Faced = Evaluation | PooledEvaluation
-"""What a row of the table is about."""
-
-
-def _difference(first: Faced, second: Faced) -> dict[str, Estimate]:
+def difference_between(first: "Faced", second: "Faced") -> dict[str, Estimate]:
+    """Figures of merit of the first less those of the second, which must face its trials."""
     trials, others = first.members[0].trials, second.members[0].trials
     if different := trials.first_difference(others):
         raise InvalidInputError(f"differences need the same trials, but in the second, {different}")
-    return estimate_metrics(_outcomes(first.members), _outcomes(second.members))
+    return estimate_metrics(outcomes_of(first.members), outcomes_of(second.members))
 
 
-def _outcomes(members: Sequence[Evaluation]) -> Outcomes:
+def outcomes_of(members: Sequence[Evaluation]) -> Outcomes:
     """Outcomes of one or several training seeds in the same trials."""
     return Outcomes(
         tuple(member.rollouts for member in members),
@@ -247,7 +172,7 @@ def _outcomes(members: Sequence[Evaluation]) -> Outcomes:
     )
 
 
-def _row(name: str, evaluations: Sequence[Evaluation]) -> dict[str, Any]:
+def common_figures(name: str, evaluations: Sequence[Evaluation]) -> dict[str, Any]:
     """Fields of a row, with causes of failure, the most frequent first."""
     contestant, trials = evaluations[0].contestant, evaluations[0].trials
     causes = (
@@ -348,73 +273,3 @@ def run_trials(
     """
     holding = measure_holding(contestant, trials) if hold else None
     return Evaluation(contestant, trials, contestant.run(trials), bounds, holding)
-
-
-def pool(evaluations: Sequence[Evaluation]) -> tuple[PooledEvaluation, ...]:
-    """Pool the training seeds of each recipe and problem that has several.
-
-    Groups are those of ``kinarm.evaluation.selection.group_names``.
-    """
-    names = group_names(evaluation.contestant for evaluation in evaluations)
-    groups: dict[tuple[str, str], list[Evaluation]] = {}
-    for evaluation in evaluations:
-        key = (names[evaluation.contestant.name], evaluation.problem.digest)
-        groups.setdefault(key, []).append(evaluation)
-    several = ((name, members) for (name, _), members in groups.items() if len(members) > 1)
-    return tuple(PooledEvaluation(name, tuple(members)) for name, members in several)
-
-
-def _differences(rows: Sequence[Faced], reference: str) -> Iterator[Difference]:
-    """What policies have less the first of their problem that a name stands for."""
-    references: dict[str, Faced] = {}
-    for row in rows:
-        if any(is_called(member.contestant, reference) for member in row.members):
-            references.setdefault(row.problem.digest, row)
-    for row in sorted(rows, key=lambda row: -(row.metrics["success"].value or 0.0)):
-        other = references.get(row.problem.digest, row)
-        if other is not row and row.members[0].contestant is not ORACLE:
-            yield Difference(
-                policy=row.name,
-                reference=other.name,
-                problem=row.problem.name,
-                metrics=row.difference(other),
-            )
-
-
-def evaluation_document(
-    evaluations: Sequence[Evaluation], command: str, reference: str = ""
-) -> EvaluationDocument:
-    """Everything about an evaluation, to write and read again.
-
-    Parameters
-    ----------
-    evaluations : sequence of Evaluation
-        One trial set per problem; policies and problems have distinct names.
-    command : str
-        The command that made them.
-    reference : str
-        Name or file of what others are compared with, if any.
-    """
-    check_names((each.contestant, each.problem) for each in evaluations)
-    any_set = evaluations[0].trials
-    firsts = {each.problem.name: each for each in reversed(evaluations)}
-    facing = {name: firsts[name] for name in reversed(firsts)}
-    protocol = Protocol(
-        command=command,
-        trials=len(any_set),
-        seed=any_set.seed,
-        hold=any(each.holding is not None for each in evaluations),
-        intervals=Intervals(),
-        problems={n: FacedProblem.of(each.trials, each.bounds) for n, each in facing.items()},
-        versions=package_versions(),
-        commit=source_commit(),
-    )
-    pooled = pool(evaluations)
-    members = {member for group in pooled for member in group.members}
-    rows: list[Faced] = [*pooled, *(each for each in evaluations if each not in members)]
-    return EvaluationDocument(
-        protocol=protocol,
-        results=[each.result for each in evaluations],
-        pooled=[each.result for each in pooled],
-        differences=list(_differences(rows, reference)) if reference else [],
-    )

@@ -165,7 +165,7 @@ class EvaluationRequest(ProblemOptions, TableOptions):
 
         ``command`` is recorded, by default this request; ``tell`` hears what is being done.
         """
-        from kinarm.evaluation.evaluation import evaluation_document
+        from kinarm.evaluation.summary import evaluation_document
 
         pairs = self._checked_pairs()
         with ExitStack() as locks:

@@ -7,10 +7,11 @@ import pytest
 
 from kinarm.evaluation.bounds import oracle_bounds
 from kinarm.evaluation.contestants import ORACLE
-from kinarm.evaluation.evaluation import evaluation_document, run_trials
+from kinarm.evaluation.evaluation import run_trials
 from kinarm.evaluation.finding import find_contestants
 from kinarm.evaluation.report.groups import group_results, worst_trials
 from kinarm.evaluation.report.page import write_report
+from kinarm.evaluation.summary import evaluation_document
 from kinarm.evaluation.table import metric_columns
 from kinarm.evaluation.trials import TrialSet
 

@@ -9,7 +9,7 @@ import pytest
 from kinarm.errors import InvalidInputError, OutputError
 from kinarm.evaluation.bounds import oracle_bounds
 from kinarm.evaluation.contestants import ORACLE, Contestant
-from kinarm.evaluation.evaluation import evaluation_document, run_trials
+from kinarm.evaluation.evaluation import run_trials
 from kinarm.evaluation.metrics import METRICS
 from kinarm.evaluation.report.card import (
     check_card,
@@ -17,6 +17,7 @@ from kinarm.evaluation.report.card import (
     shown_trials,
     write_card,
 )
+from kinarm.evaluation.summary import evaluation_document
 from kinarm.policies import load_policy
 from kinarm.problem import PROBLEMS
 

@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 
 from kinarm.errors import InvalidInputError
-from kinarm.evaluation.evaluation import evaluate, evaluation_document, pool
+from kinarm.evaluation.evaluation import evaluate
 from kinarm.evaluation.metrics import METRICS
 from kinarm.evaluation.statistics import share_difference
+from kinarm.evaluation.summary import evaluation_document, pool
 from kinarm.task import RewardWeights
 
 

@@ -10,8 +10,9 @@ from rich.console import Console
 
 from kinarm.errors import InvalidInputError
 from kinarm.evaluation.document import EvaluationDocument
-from kinarm.evaluation.evaluation import evaluate, evaluation_document
+from kinarm.evaluation.evaluation import evaluate
 from kinarm.evaluation.metrics import METRICS, Metric
+from kinarm.evaluation.summary import evaluation_document
 from kinarm.evaluation.table import print_table
 from kinarm.problem import PROBLEMS, ReachProblem
 from kinarm.reference import ReferenceSimulator

@@ -12,7 +12,8 @@ from reseeded import reseeded
 from kinarm.arm import Arm
 from kinarm.errors import InvalidInputError, PolicyFileError
 from kinarm.evaluation.contestants import Contestant
-from kinarm.evaluation.evaluation import evaluate, pool
+from kinarm.evaluation.evaluation import evaluate
+from kinarm.evaluation.summary import pool
 from kinarm.policies.oracle import Oracle
 from kinarm.reference import ReferenceSimulator
 

@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from kinarm.evaluation.bounds import oracle_bounds
-from kinarm.evaluation.evaluation import evaluate, pool, run_trials
+from kinarm.evaluation.evaluation import evaluate, run_trials
 from kinarm.evaluation.finding import find_contestants
+from kinarm.evaluation.summary import pool
 from kinarm.policies.oracle import Oracle
 
 COMPARED = ("relative_success", "step_ratio", "step_ratio_p95")

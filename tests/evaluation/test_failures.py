@@ -5,8 +5,8 @@ from collections import Counter
 import numpy as np
 import pytest
 
-from kinarm.evaluation.evaluation import pool
 from kinarm.evaluation.outcomes import Cause, failure_causes
+from kinarm.evaluation.summary import pool
 
 
 def counted(rows):

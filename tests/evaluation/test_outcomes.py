@@ -2,7 +2,8 @@
 
 from kinarm.evaluation.bounds import oracle_bounds
 from kinarm.evaluation.contestants import Contestant
-from kinarm.evaluation.evaluation import evaluation_document, run_trials
+from kinarm.evaluation.evaluation import run_trials
+from kinarm.evaluation.summary import evaluation_document
 from kinarm.evaluation.trials import TrialSet
 
 

@@ -7,7 +7,7 @@ import pytest
 
 from kinarm.errors import InvalidInputError, UnknownNameError
 from kinarm.evaluation.document import EvaluationDocument
-from kinarm.evaluation.evaluation import evaluation_document
+from kinarm.evaluation.summary import evaluation_document
 
 
 @pytest.fixture

@@ -4,9 +4,10 @@ import pytest
 
 from kinarm.evaluation.bounds import oracle_bounds
 from kinarm.evaluation.contestants import ORACLE
-from kinarm.evaluation.evaluation import evaluation_document, run_trials
+from kinarm.evaluation.evaluation import run_trials
 from kinarm.evaluation.report.groups import group_results
 from kinarm.evaluation.report.page import report_page
+from kinarm.evaluation.summary import evaluation_document
 
 
 @pytest.fixture(scope="module")

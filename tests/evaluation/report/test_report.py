@@ -9,10 +9,10 @@ import pytest
 from drawings import PIXEL
 
 from kinarm.errors import InvalidInputError
-from kinarm.evaluation.evaluation import evaluation_document
 from kinarm.evaluation.report.groups import record_worst, worst_trials
 from kinarm.evaluation.report.page import report_page
 from kinarm.evaluation.report.templating import template_environment
+from kinarm.evaluation.summary import evaluation_document
 from kinarm.evaluation.table import table_rows
 
 

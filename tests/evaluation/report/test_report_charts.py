@@ -8,13 +8,14 @@ import numpy as np
 import pytest
 from drawings import PIXEL
 
-from kinarm.evaluation.evaluation import evaluate, evaluation_document
+from kinarm.evaluation.evaluation import evaluate
 from kinarm.evaluation.report import charts
 from kinarm.evaluation.report.charts import level
 from kinarm.evaluation.report.groups import group_results
 from kinarm.evaluation.report.page import report_page
 from kinarm.evaluation.report.templating import template_environment
 from kinarm.evaluation.statistics import share_over_seeds
+from kinarm.evaluation.summary import evaluation_document
 from kinarm.problem import ReachProblem
 from kinarm.scene import GoalRegion, Obstacle, Scene
 from kinarm.task import ReachTask

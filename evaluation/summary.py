@@ -1,0 +1,170 @@
+"""Sum up evaluations: pooled training seeds, differences, and the document of all."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from kinarm.evaluation.contestants import ORACLE
+from kinarm.evaluation.document import (
+    Difference,
+    EvaluationDocument,
+    FacedProblem,
+    Intervals,
+    PooledResult,
+    Protocol,
+    Spread,
+    WorstSeed,
+)
+from kinarm.evaluation.estimates import estimate_metrics
+from kinarm.evaluation.evaluation import (
+    Evaluation,
+    common_figures,
+    difference_between,
+    outcomes_of,
+)
+from kinarm.evaluation.selection import check_names, group_names, is_called
+from kinarm.evaluation.statistics import Estimate
+from kinarm.policies.provenance import package_versions, source_commit
+from kinarm.problem import ReachProblem
+
+
+@dataclass(frozen=True, eq=False)
+class PooledEvaluation:
+    """How several training seeds of one recipe did on the same trials."""
+
+    name: str
+    members: tuple[Evaluation, ...]
+
+    @property
+    def problem(self) -> ReachProblem:
+        """The problem that was faced."""
+        return self.members[0].problem
+
+    @cached_property
+    def metrics(self) -> dict[str, Estimate]:
+        """Figures of merit over all seeds; intervals are over seeds and trials."""
+        return estimate_metrics(outcomes_of(self.members))
+
+    def difference(self, other: "Faced") -> dict[str, Estimate]:
+        """Figures of merit less those of another; see `Evaluation.difference`."""
+        return difference_between(self, other)
+
+    @property
+    def worst(self) -> Evaluation:
+        """The training seed with the lowest success."""
+        return min(self.members, key=lambda member: int(member.rollouts.success.sum()))
+
+    @property
+    def spread(self) -> dict[str, Spread]:
+        """How the metrics that all seeds have vary over the seeds."""
+        spread = {}
+        for name in self.metrics:
+            known = [member.metrics[name].value for member in self.members]
+            each = [value for value in known if value is not None]
+            if len(each) == len(known):
+                std = float(np.std(each, ddof=1))
+                spread[name] = Spread(min=min(each), max=max(each), std=std, each=each)
+        return spread
+
+    @property
+    def result(self) -> PooledResult:
+        """Figures of merit over all seeds, for a document."""
+        worst = self.worst
+        return PooledResult(
+            **common_figures(self.name, self.members),
+            metrics=self.metrics,
+            members=[member.contestant.name for member in self.members],
+            training_seeds=[member.contestant.seed for member in self.members],
+            spread=self.spread,
+            worst_seed=WorstSeed(
+                policy=worst.contestant.name,
+                training_seed=worst.contestant.seed,
+                success=worst.success,
+            ),
+        )
+
+    def to_json(self) -> dict[str, Any]:
+        """Figures of merit as JSON holds them."""
+        return self.result.to_json()
+
+    def __repr__(self) -> str:
+        seeds, trials = len(self.members), self.members[0].trials
+        on = f"{self.name} on {len(trials)} trials of {self.problem.name}"
+        return f"PooledEvaluation({seeds} seeds of {on}, success {self.metrics['success']})"
+
+
+Faced = Evaluation | PooledEvaluation
+"""What a row of the table is about."""
+
+
+def pool(evaluations: Sequence[Evaluation]) -> tuple[PooledEvaluation, ...]:
+    """Pool the training seeds of each recipe and problem that has several.
+
+    Groups are those of ``kinarm.evaluation.selection.group_names``.
+    """
+    names = group_names(evaluation.contestant for evaluation in evaluations)
+    groups: dict[tuple[str, str], list[Evaluation]] = {}
+    for evaluation in evaluations:
+        key = (names[evaluation.contestant.name], evaluation.problem.digest)
+        groups.setdefault(key, []).append(evaluation)
+    several = ((name, members) for (name, _), members in groups.items() if len(members) > 1)
+    return tuple(PooledEvaluation(name, tuple(members)) for name, members in several)
+
+
+def _differences(rows: Sequence[Faced], reference: str) -> Iterator[Difference]:
+    """What policies have less the first of their problem that a name stands for."""
+    references: dict[str, Faced] = {}
+    for row in rows:
+        if any(is_called(member.contestant, reference) for member in row.members):
+            references.setdefault(row.problem.digest, row)
+    for row in sorted(rows, key=lambda row: -(row.metrics["success"].value or 0.0)):
+        other = references.get(row.problem.digest, row)
+        if other is not row and row.members[0].contestant is not ORACLE:
+            yield Difference(
+                policy=row.name,
+                reference=other.name,
+                problem=row.problem.name,
+                metrics=row.difference(other),
+            )
+
+
+def evaluation_document(
+    evaluations: Sequence[Evaluation], command: str, reference: str = ""
+) -> EvaluationDocument:
+    """Everything about an evaluation, to write and read again.
+
+    Parameters
+    ----------
+    evaluations : sequence of Evaluation
+        One trial set per problem; policies and problems have distinct names.
+    command : str
+        The command that made them.
+    reference : str
+        Name or file of what others are compared with, if any.
+    """
+    check_names((each.contestant, each.problem) for each in evaluations)
+    any_set = evaluations[0].trials
+    firsts = {each.problem.name: each for each in reversed(evaluations)}
+    facing = {name: firsts[name] for name in reversed(firsts)}
+    protocol = Protocol(
+        command=command,
+        trials=len(any_set),
+        seed=any_set.seed,
+        hold=any(each.holding is not None for each in evaluations),
+        intervals=Intervals(),
+        problems={n: FacedProblem.of(each.trials, each.bounds) for n, each in facing.items()},
+        versions=package_versions(),
+        commit=source_commit(),
+    )
+    pooled = pool(evaluations)
+    members = {member for group in pooled for member in group.members}
+    rows: list[Faced] = [*pooled, *(each for each in evaluations if each not in members)]
+    return EvaluationDocument(
+        protocol=protocol,
+        results=[each.result for each in evaluations],
+        pooled=[each.result for each in pooled],
+        differences=list(_differences(rows, reference)) if reference else [],
+    )
