@@ -132,7 +132,7 @@ class Networks:
 
     @cached_property
     def parameters(self) -> Array:
-        """What kernels read, shape (n_networks, n_parameters); see `split_parameters`."""
+        """What kernels read, shape (n_networks, n_parameters); see ``split_parameters``."""
         n = len(self)
         parts = ((weights.transpose(0, 2, 1).reshape(n, -1), bias) for weights, bias in self.layers)
         return np.concatenate([*chain(*parts)], axis=1)

@@ -109,7 +109,7 @@ class ARSState(TrainingState):
     ----------
     theta : ndarray, shape (n_actions, n_observations) or (1, n_parameters)
         Parameters of a linear policy, or of a network as in
-        `kinarm.networks.split_parameters`.
+        ``kinarm.networks.split_parameters``.
     normalizer : Normalizer
         Statistics mu and Sigma of the observations.
     generator : dict

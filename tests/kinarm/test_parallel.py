@@ -66,17 +66,22 @@ class TestTogether:
     @pytest.mark.parametrize("threads", [1, 2])
     def test_an_interruption_ends_long_work_after_the_rows_under_way(self, threads):
         ended = threading.Semaphore(0)
+        # A background job inherits that Ctrl-C is ignored.
+        handler = signal.signal(signal.SIGINT, signal.default_int_handler)
 
         def kernel(counters, thread):
-            while counters[0] < 10**6:
+            while counters[0] < 3000:
                 counters[0] += 1
                 time.sleep(0.01)
             ended.release()
             return 0
 
         threading.Timer(0.3, os.kill, (os.getpid(), signal.SIGINT)).start()
-        with pytest.raises(KeyboardInterrupt):
-            run_together(kernel, 10**9, threads, int)
+        try:
+            with pytest.raises(KeyboardInterrupt):
+                run_together(kernel, 10**9, threads, int)
+        finally:
+            signal.signal(signal.SIGINT, handler)
         assert all(ended.acquire(timeout=60) for _ in range(threads))
 
     def test_a_thread_that_comes_too_late_is_not_waited_for(self):
