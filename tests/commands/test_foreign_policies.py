@@ -109,4 +109,4 @@ class TestCard:
         own = Policy.from_sb3(saved, "right", saved.with_name("model_vecnormalize_20_steps.pkl"))
         seen = np.random.default_rng(0).normal(size=(10, 48))
         np.testing.assert_array_equal(beside(seen), own(seen))
-        assert "| algorithm | ppo |" in saved.with_name("share").joinpath("mine.md").read_text()
+        assert "| algorithm | `ppo` |" in saved.with_name("share").joinpath("mine.md").read_text()

@@ -81,7 +81,7 @@ def test_check_of_the_papers_third_task(run, write, tmp_path):
         "kinarm-problem", "check", "both", "--trials", 20, "--json", "a.json", "--picture", "a.png"
     )
     assert (answer.status, answer.err) == (0, "")
-    assert "reached 100.0 % (83.9..100.0), out of reach 0.0 %" in answer.out
+    assert "reached 100.0 % (86.1..100.0), out of reach 0.0 %" in answer.out
     assert "mirror   yes: the problem is its own image" in answer.out
     assert "at home nothing touches" in answer.out
     found = json.loads((tmp_path / "a.json").read_text())
