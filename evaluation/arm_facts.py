@@ -46,7 +46,7 @@ def arm_facts(arm: Arm) -> str:
         shapes=zip(contact.body_names, shapes, strict=False),
         statistics=ContactStatistics.sample(contact),
         untested=untested_pairs(contact),
-        warnings=arm_warnings(arm),
+        warnings=arm_warnings(contact),
         samples=SAMPLES,
     )
     return text.rstrip()

@@ -250,19 +250,20 @@ def contact_on_bare_ground(arm: Arm) -> ContactModel:
     return ContactModel.build(arm, Scene(obstacles=(), goal_regions=()))
 
 
-def arm_warnings(arm: Arm) -> list[str]:
+def arm_warnings(contact: ContactModel) -> list[str]:
     """What makes the description of an arm doubtful, a line each; nothing of shipped arms.
 
     These are missing collision shapes, pairs of bodies that are never tested,
-    since they touch at home, and joints faster than 30 rad/s.
+    since they touch at home, and joints faster than 30 rad/s. Takes an arm's
+    `contact_on_bare_ground`.
     """
-    lines: list[str] = []
+    arm, lines = contact.arm, list[str]()
     if arm.specification.source in arm_names():
         return lines
     if not any(shape.parentJoint for shape in arm.geometry.geometryObjects):
         lines.append("no moving link has a collision shape: it touches nothing, ever")
-    left_out = contact_on_bare_ground(arm).left_out
-    resting = [" and ".join(pair) for pair, why in left_out.items() if why == TOUCH_AT_HOME]
+    left_out = contact.left_out.items()
+    resting = [" and ".join(pair) for pair, why in left_out if why == TOUCH_AT_HOME]
     if resting:
         more = f", and {len(resting) - 3} more" if len(resting) > 3 else ""
         lines.append(
