@@ -46,14 +46,22 @@ def metric_column(name: str, estimates: Callable[[T], Mapping[str, Estimate]]) -
             beside = words.format(METRICS[other].write(known[other].value or 0.0))
         return Cell(metric.write(value), beside)
 
-    def values(row: T) -> dict[str, float | None]:
-        estimate = estimates(row)[name]
-        ends = zip((f"{name}_low", f"{name}_high"), estimate.ci95 or (), strict=False)
-        return {name: estimate.value, **dict(ends)}
-
     heading = metric.heading or f"{name.replace('_', ' ')} {metric.unit}".rstrip()
     priority = metric.priority if metric.heading else ON_REQUEST
-    return Column(heading, cell, name, metric.meaning, priority, values)
+    return Column(
+        heading,
+        cell,
+        name,
+        metric.meaning,
+        priority,
+        lambda row: raw_estimate(name, estimates(row)[name]),
+    )
+
+
+def raw_estimate(name: str, estimate: Estimate) -> dict[str, float | None]:
+    """An estimate and the ends of its interval, as columns of CSV files."""
+    ends = zip((f"{name}_low", f"{name}_high"), estimate.ci95 or (), strict=False)
+    return {name: estimate.value, **dict(ends)}
 
 
 def difference_cell(name: str, difference: Estimate) -> Cell:

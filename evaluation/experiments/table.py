@@ -17,7 +17,7 @@ from kinarm.evaluation.experiments.runs import TrainedRun
 from kinarm.evaluation.metrics import METRICS
 from kinarm.evaluation.outcomes import Outcomes
 from kinarm.evaluation.statistics import Estimate, share_difference, share_over_seeds
-from kinarm.evaluation.table import SEEDS_PRIORITY, difference_cell, metric_column
+from kinarm.evaluation.table import SEEDS_PRIORITY, difference_cell, metric_column, raw_estimate
 from kinarm.policies.config import TrainingConfig
 from kinarm.policies.oracle import OracleSolutions
 
@@ -179,11 +179,6 @@ def _estimates(group: Group) -> dict[str, Estimate]:
 
 def _difference_column() -> Column[Group]:
     """The column of the difference to the first group."""
-
-    def values(group: Group) -> dict[str, float | None]:
-        ends = zip(("difference_low", "difference_high"), group.difference.ci95 or (), strict=False)
-        return {"difference": group.difference.value, **dict(ends)}
-
     meaning = "success less that of the first trainings of the problem, in the same trials"
     return Column(
         "less first %",
@@ -191,7 +186,7 @@ def _difference_column() -> Column[Group]:
         "difference",
         meaning,
         priority=9.5,
-        values=values,
+        values=lambda group: raw_estimate("difference", group.difference),
     )
 
 
