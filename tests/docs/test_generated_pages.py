@@ -4,6 +4,7 @@ import sys
 from types import ModuleType
 
 import pytest
+from known_arms import is_installed
 from pages import DOCS, pages
 
 from docs import tables
@@ -45,4 +46,7 @@ def test_every_figure_is_defined() -> None:
 
 @pytest.mark.parametrize("name", PAGES)
 def test_a_page_holds_what_would_be_written_now(name: str) -> None:
-    assert tables.filled(PAGES[name]) == PAGES[name].read_text()
+    text = PAGES[name].read_text()
+    if "<!-- table arms -->" in text and not is_installed():
+        pytest.skip("the table of arms needs the extra robots")
+    assert tables.filled(PAGES[name]) == text
