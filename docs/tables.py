@@ -17,7 +17,7 @@ import numpy as np
 from kinarm import PROBLEMS, REWARD_TERMS, Arm, RewardWeights, Scene, Simulator
 from kinarm.__main__ import COMMANDS
 from kinarm._fields import summary_of
-from kinarm.contact_shapes import enclosing_capsule
+from kinarm.enclosures import enclosing_capsule
 from kinarm.envs import ENVIRONMENTS
 from kinarm.evaluation import METRICS
 from kinarm.evaluation.commands import arms, problem

@@ -3,6 +3,7 @@ from .arm_specification import AllowedContact as AllowedContact
 from .arm_specification import ArmFile as ArmFile
 from .arm_specification import ArmSpecification as ArmSpecification
 from .arm_specification import arm_names as arm_names
+from .bodies import Body as Body
 from .clearance import Clearance as Clearance
 from .collision import Contact as Contact
 from .envs import ReachEnv as ReachEnv

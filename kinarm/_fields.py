@@ -157,12 +157,13 @@ def _value(hint: Any, entry: Any, where: str, path: str, kind: type) -> Any:
         entry = entry.tolist()
     if entry is None and choices != (hint,):
         return None
-    for choice in choices:
-        if is_dataclass(choice) and isinstance(choice, type):
-            if isinstance(entry, choice):
-                return entry
-            if isinstance(entry, Mapping):
-                return from_plain(choice, entry, where, f"{path}.")
+    tables = [choice for choice in choices if is_dataclass(choice) and isinstance(choice, type)]
+    if isinstance(entry, tuple(tables)):
+        return entry
+    if tables and isinstance(entry, Mapping):
+        # Of several kinds of tables, the one with most of these keys.
+        fitting = max(tables, key=lambda table: len(entry.keys() & init_fields(table)))
+        return from_plain(fitting, entry, where, f"{path}.")
     hint = choices[0]
     origin, arguments = get_origin(hint), get_args(hint)
     if origin is tuple and isinstance(entry, list | tuple):

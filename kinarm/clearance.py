@@ -15,7 +15,7 @@ from kinarm._parallel import run_rows
 from kinarm.arm import Arm
 from kinarm.arm_specification import arm_names
 from kinarm.collision import TOUCH_AT_HOME, ContactModel, make_verdicts_reliable
-from kinarm.contact_shapes import enclosing_polytope
+from kinarm.enclosures import enclosing_polytope
 from kinarm.errors import ProblemError
 from kinarm.kernels.closest import Bodies, closest_pairs
 from kinarm.kernels.compiling import Array

@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from kinarm.arm import Arm
 from kinarm.contact_shapes import ContactShapes
 from kinarm.errors import ProblemError
+from kinarm.meshes import coal_shape
 from kinarm.scene import Scene
 
 CLOSE, OFTEN, CLOSENESS_SAMPLES = 0.025, 0.05, 200
@@ -234,14 +235,10 @@ def start_anew(requests: Iterable[coal.CollisionRequest]) -> None:
 
 
 def _add_scene(geometry: pin.GeometryModel, scene: Scene) -> None:
-    """Add obstacles, then the ground, to a geometry model."""
-    for obstacle in scene.obstacles:
-        placement = pin.SE3(obstacle.rotation, obstacle.centre)
-        box = coal.Box(*obstacle.size)
-        geometry.addGeometryObject(pin.GeometryObject(obstacle.name, 0, placement, box))
-    if scene.ground:
-        halfspace = coal.Halfspace(np.array([0.0, 0.0, 1.0]), 0.0)
-        geometry.addGeometryObject(pin.GeometryObject("ground", 0, pin.SE3.Identity(), halfspace))
+    """Add the bodies of a scene to a geometry model."""
+    for body in scene.bodies:
+        placement = pin.SE3(body.rotation, np.array(body.position))
+        geometry.addGeometryObject(pin.GeometryObject(body.name, 0, placement, coal_shape(body)))
 
 
 def _links(arm: Arm) -> list[str]:

@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 from scipy.spatial import HalfspaceIntersection
 
 from kinarm._files import Arrays, absolute, cached_arrays, first_line, is_file
-from kinarm.errors import ArmError
+from kinarm.bodies import Body
+from kinarm.errors import ArmError, finite_array
 from kinarm.urdf_tree import FARTHEST, parse_xml
 
 FORMATS = (".dae", ".obj", ".stl")
@@ -39,6 +40,9 @@ MANY_VERTICES = 1000
 
 PLANES = 160
 """Faces of such a hull at most; vertices are twice as many less four."""
+
+CONVEX = 0.02
+"""Share by which the hull of a mesh may be larger if the mesh counts as convex."""
 
 EXCESS = 1e-4
 """Depth of a corner up to which it is not cut off [m]."""
@@ -145,9 +149,58 @@ def hull_of_mesh(path: Path, scale: NDArray[np.float64]) -> coal.ConvexBase:
     """
     content = scale.tobytes() + mesh_content(path)
     corners = cached_arrays("hull", VERSION, content, lambda: _corners(path, scale))["corners"]
-    points = coal.StdVec_Vec3s()
-    points.extend(corners)
-    return coal.Convex.convexHull(points, True, "Qt")
+    return convex_hull(corners)
+
+
+def convex_hull(points: NDArray[np.float64]) -> coal.ConvexBase:
+    """Convex hull of points, shape (n, 3), in Coal."""
+    listed = coal.StdVec_Vec3s()
+    listed.extend(points)
+    return coal.Convex.convexHull(listed, True, "Qt")
+
+
+def mesh_vertices(
+    path: str | Path, *, scale: float = 1.0, hull: bool = False
+) -> NDArray[np.float64]:
+    """Vertices of a convex mesh file, for a `kinarm.bodies.Body`, shape (n, 3) [m].
+
+    Those of very many are replaced by a simpler polytope around them.
+
+    Parameters
+    ----------
+    path : str or Path
+        An .stl, .obj or .dae file.
+    scale : float
+        Metres of its unit of length, such as 0.001.
+    hull : bool
+        Take the convex hull of what is not convex.
+
+    Raises
+    ------
+    ArmError
+        If the file is no readable mesh, or is not convex.
+    """
+    file, factors = Path(path), np.full(3, finite_array("scale", scale, ()))
+    shape = hull_of_mesh(file, factors)
+    if not hull:
+        solid = coal.MeshLoader(coal.BV_AABB).load(str(file), factors).computeVolume()
+        excess = shape.computeVolume() / abs(solid) - 1 if solid else np.inf
+        if excess > CONVEX:
+            raise ArmError(
+                f"mesh {file.name!r} is not convex: its hull is {excess:.0%} larger; "
+                "hull = true takes the hull"
+            )
+    return np.array(shape.points())
+
+
+def coal_shape(body: Body) -> coal.CollisionGeometry:
+    """A body's shape in Coal."""
+    if body.shape == "mesh":
+        return convex_hull(np.array(body.vertices))
+    if body.shape == "halfspace":
+        return coal.Halfspace(np.array([0.0, 0.0, 1.0]), 0.0)
+    kinds = {"box": coal.Box, "sphere": coal.Sphere, "capsule": coal.Capsule}
+    return kinds.get(body.shape, coal.Cylinder)(*body.size)
 
 
 def _corners(path: Path, scale: NDArray[np.float64]) -> Arrays:

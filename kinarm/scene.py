@@ -1,19 +1,18 @@
-"""The world around the arm: the ground, solid boxes, and places of goals.
+"""The world around the arm: the ground, solid bodies, and places of goals.
 
 What is empty or named twice is a `ProblemError`.
 """
 
-import math
 from dataclasses import dataclass, field
+from functools import cached_property
 from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
 
 from kinarm._fields import OPTIONAL, Checked
+from kinarm.bodies import Body, Point, rotation_matrix
 from kinarm.errors import NOT_NEGATIVE, ProblemError, UnknownNameError
-
-Point = tuple[float, float, float]
 
 ROUNDING = 1e-12
 """Lengths that differ less are the same [m]."""
@@ -24,23 +23,6 @@ def _check_box(what: str, lower: Point, upper: Point, *, flat: bool) -> None:
     if min(extents) < 0 or sum(extent > 0 for extent in extents) < (2 if flat else 3):
         wanted = "lower <= upper, and < along two axes at least" if flat else "lower < upper"
         raise ProblemError(f"{what} is empty: {lower} to {upper}; expected {wanted}")
-
-
-def rotation_matrix(rpy: Point) -> NDArray[np.float64]:
-    """Rotation by roll, pitch and yaw about the fixed axes x, y and z, shape (3, 3).
-
-    Entries have 12 digits: the same on every machine.
-    """
-    (cr, cp, cy), (sr, sp, sy) = (
-        [round(of(angle), 12) + 0.0 for angle in rpy] for of in (math.cos, math.sin)
-    )
-    return np.array(
-        [
-            [cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr],
-            [sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr],
-            [-sp, cp * sr, cp * cr],
-        ]
-    )
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -88,21 +70,13 @@ class Obstacle(Checked):
         _check_box(f"obstacle {self.name!r}", self.lower, self.upper, flat=False)
 
     @property
-    def size(self) -> NDArray[np.float64]:
-        """Lengths of its edges [m], shape (3,)."""
-        size: NDArray[np.float64] = np.array(self.upper) - np.array(self.lower)
-        return size
-
-    @property
-    def centre(self) -> NDArray[np.float64]:
-        """Its centre in the world [m], shape (3,)."""
-        centre: NDArray[np.float64] = (np.array(self.lower) + np.array(self.upper)) / 2
-        return centre
-
-    @property
-    def rotation(self) -> NDArray[np.float64]:
-        """Orientation in the world as a rotation matrix, shape (3, 3)."""
-        return rotation_matrix((0.0, 0.0, self.yaw))
+    def body(self) -> Body:
+        """The same box by its centre."""
+        centre = (np.array(self.lower) + np.array(self.upper)) / 2
+        size = np.array(self.upper) - np.array(self.lower)
+        return Body(
+            name=self.name, shape="box", size=size, position=centre, rpy=(0.0, 0.0, self.yaw)
+        )
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -156,8 +130,8 @@ class Scene(Checked):
         Whether the half-space z < 0 is solid.
     cube_edge : float
         Edge of the cube that marks a goal, which is no obstacle [m].
-    obstacles : tuple of Obstacle
-        Solid boxes, whether goals lie on them or not.
+    obstacles : tuple of Obstacle or Body
+        Solid bodies, whether goals lie on them or not.
     goal_regions : tuple of GoalRegion
         Where goals may lie.
     mount : Mount
@@ -166,7 +140,7 @@ class Scene(Checked):
 
     ground: bool = True
     cube_edge: float = field(default=0.05, metadata=NOT_NEGATIVE)
-    obstacles: tuple[Obstacle, ...] = PAPER_BENCHES
+    obstacles: tuple[Obstacle | Body, ...] = PAPER_BENCHES
     goal_regions: tuple[GoalRegion, ...] = PAPER_GOALS
     mount: Mount = field(default_factory=Mount, metadata=OPTIONAL)
 
@@ -187,16 +161,21 @@ class Scene(Checked):
                 return region
         raise UnknownNameError("goal region", name, (region.name for region in self.goal_regions))
 
-    def obstacle_around(self, region: GoalRegion) -> Obstacle | None:
-        """First obstacle that wholly contains a goal region, or None.
+    @cached_property
+    def bodies(self) -> tuple[Body, ...]:
+        """All that the arm may touch: the obstacles, then the ground as a half-space."""
+        obstacles = (each if isinstance(each, Body) else each.body for each in self.obstacles)
+        ground = (Body(name="ground", shape="halfspace"),) if self.ground else ()
+        return (*obstacles, *ground)
 
-        What lies on an obstacle's face is outside.
+    def obstacle_around(self, region: GoalRegion) -> Body | None:
+        """First body that wholly contains a goal region, or None.
+
+        What lies on a body's face is outside.
         """
         corners = np.array(list(product(*zip(region.lower, region.upper, strict=True))))
-        for obstacle in self.obstacles:
-            offsets = np.abs((corners - obstacle.centre) @ obstacle.rotation)
-            middle = np.abs((corners.mean(axis=0) - obstacle.centre) @ obstacle.rotation)
-            half = obstacle.size / 2
-            if (offsets <= half + ROUNDING).all() and (middle < half - ROUNDING).all():
-                return obstacle
+        middle = corners.mean(axis=0, keepdims=True)
+        for body in self.bodies:
+            if body.contains(corners, ROUNDING).all() and body.contains(middle, -ROUNDING).all():
+                return body
         return None

@@ -20,7 +20,7 @@ from kinarm.kernels.compiling import Array
 from kinarm.kernels.records import recorded
 from kinarm.kernels.rollout import begin
 from kinarm.kernels.screening import screen
-from kinarm.kernels.session import Alone, Block, Session, work_space
+from kinarm.kernels.session import Alone, Block, Session, furnish, work_space
 from kinarm.observation import observation_size
 from kinarm.problem import ProblemLike, ReachProblem
 from kinarm.task import REWARD_TERMS, Goals
@@ -263,8 +263,10 @@ class World(InverseKinematics):
         try:
             space = self._idle.pop()
         except IndexError:
-            n_pairs = len(self.contact_model.shapes.pairs)
-            space = work_space(n_joints=self.arm.n_joints, n_pairs=n_pairs)
+            shapes = self.contact_model.shapes
+            sizes = {"n_pairs": len(shapes.pairs), "n_placed": len(shapes.placed)}
+            space = work_space(n_joints=self.arm.n_joints, **sizes)
+            furnish(shapes.placed, *space)
         n_proven = screen(first, last, *space, *arrays)
         self._idle.append(space)
         return n_proven

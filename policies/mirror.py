@@ -6,20 +6,21 @@ mirror sees goals on the left reflected, and its actions are reflected in turn: 
 both benches.
 """
 
-import math
 from functools import lru_cache
+from typing import Any
 
 import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
+from kinarm.bodies import Body, Point
 from kinarm.clearance import random_configurations
+from kinarm.contact_shapes import CUBE
 from kinarm.errors import InvalidInputError
 from kinarm.kernels.compiling import Array
 from kinarm.networks import Mirror
 from kinarm.observation import observation_signs
 from kinarm.problem import ReachProblem
-from kinarm.scene import Obstacle, Point
 from kinarm.world import World
 
 TESTED_CONFIGURATIONS, MIRRORED_CONFIGURATIONS = 16, 2000
@@ -131,9 +132,8 @@ def different_regions(problem: ReachProblem, symmetric: bool) -> int:
 
 def obstacles_are_symmetric(problem: ReachProblem) -> bool:
     """Whether the reflection maps the obstacles to themselves."""
-    boxes = problem.scene.obstacles
-    images = {(*_reflected(box.lower, box.upper), _turned(box, -box.yaw)) for box in boxes}
-    return images == {(box.lower, box.upper, _turned(box, box.yaw)) for box in boxes}
+    bodies = problem.scene.bodies
+    return {_outline(each, REFLECTION) for each in bodies} == {_outline(each) for each in bodies}
 
 
 def is_symmetric(problem: ReachProblem) -> bool:
@@ -146,11 +146,26 @@ def is_symmetric(problem: ReachProblem) -> bool:
     return goals == reflected and obstacles_are_symmetric(problem)
 
 
-def _turned(box: Obstacle, yaw: float) -> float:
-    """The smallest angle at which a box looks the same, rounded [rad]."""
-    square = abs(box.size[0] - box.size[1]) < ACCURACY
-    turn = math.pi / 2 if square else math.pi
-    return round(yaw % turn, 9) % round(turn, 9)
+def _outline(body: Body, signs: Point = (1.0, 1.0, 1.0)) -> tuple[Any, ...]:
+    """Points that tell where a body is, the same however it is turned into itself.
+
+    Coordinates get these signs.
+    """
+    centre, rotation = np.array(body.position), body.rotation
+    if body.shape == "halfspace":
+        normal = rotation[:, 2]
+        points = np.array([normal, normal * (normal @ centre)])
+    else:
+        points = np.array(body.vertices).reshape(-1, 3)
+        if body.shape == "box":
+            points = CUBE * np.array(body.size) / 2
+        elif body.shape != "mesh":
+            length = body.size[1] if len(body.size) > 1 else 0.0
+            points = np.array([(0.0, 0.0, -length / 2), (0.0, 0.0, length / 2)])
+        points = points @ rotation.T + centre
+    rounded = np.round(points * signs, 9) + 0.0
+    radius = body.size[:1] if body.shape != "box" else ()
+    return body.shape, radius, frozenset(map(tuple, rounded.tolist()))
 
 
 def _reflected(lower: Point, upper: Point) -> tuple[Point, Point]:

@@ -5,10 +5,11 @@ from collections.abc import Callable, Iterator, Sequence
 from functools import partial
 from pathlib import Path
 
-import numpy as np
 import pytest
 from hanging_chain import hanging_chain
 from hypothesis import settings
+from mesh_files import CUBE_CORNERS, write_obj, write_stl
+from random_scenes import random_scene
 
 from kinarm.arm import Arm
 from kinarm.problem import ReachProblem
@@ -24,12 +25,6 @@ settings.load_profile("repeatable")
 SHIPPED_ARMS = ("lrmate200ic_5l", "paper", "paper_flange")
 
 LIMITED = '<limit lower="-2" upper="2" velocity="3" effort="0"/>'
-
-CUBE_CORNERS = np.array([(x, y, z) for x in (0, 1) for y in (0, 1) for z in (0, 1)], dtype=float)
-CUBE_FACES = [
-    *[(0, 1, 3), (0, 3, 2), (4, 6, 7), (4, 7, 5), (0, 4, 5), (0, 5, 1)],
-    *[(2, 3, 7), (2, 7, 6), (0, 2, 6), (0, 6, 4), (1, 5, 7), (1, 7, 3)],
-]
 
 
 def joint(
@@ -75,24 +70,6 @@ def robot_xml(
             f'<origin xyz="{tool}"/></joint>'
         )
     return f'<robot name="made" {version}>{"".join(parts)}{extra}</robot>'
-
-
-def write_stl(path: Path, corners: np.ndarray) -> None:
-    """Write a box of triangles as ASCII STL."""
-    facets = "".join(
-        "facet normal 0 0 0\nouter loop\n"
-        + "".join("vertex {} {} {}\n".format(*corners[i]) for i in face)
-        + "endloop\nendfacet\n"
-        for face in CUBE_FACES
-    )
-    path.write_text(f"solid box\n{facets}endsolid box\n")
-
-
-def write_obj(path: Path, corners: np.ndarray) -> None:
-    """Write a box of triangles as OBJ."""
-    vertices = "".join("v {} {} {}\n".format(*corner) for corner in corners)
-    faces = "".join("f {} {} {}\n".format(*(i + 1 for i in face)) for face in CUBE_FACES)
-    path.write_text(vertices + faces)
 
 
 SKIPPED = "kinarm/skipped"
@@ -266,10 +243,12 @@ def mesh_arm(tmp_path_factory: pytest.TempPathFactory) -> Arm:
 def simulators(
     shipped_arms: dict[str, Arm], sliding_arm: Arm, mesh_arm: Arm
 ) -> dict[str, Simulator]:
-    """One single-threaded simulator per arm, problem ``both``."""
+    """One single-threaded simulator per arm, problem ``both``, and one of bodies of all shapes."""
     arms = {**shipped_arms, "sliding": sliding_arm, "mesh": mesh_arm}
     both = ReachProblem.load("both")
-    return {name: Simulator(both.replace(arm=arm), threads=1) for name, arm in arms.items()}
+    problems = {name: both.replace(arm=arm) for name, arm in arms.items()}
+    problems["bodies"] = both.replace(scene=random_scene(3, 7, largest=0.25))
+    return {name: Simulator(problem, threads=1) for name, problem in problems.items()}
 
 
 @pytest.fixture(scope="session")
@@ -278,7 +257,10 @@ def simulator(simulators: dict[str, Simulator]) -> Simulator:
     return simulators["paper"]
 
 
-@pytest.fixture(params=["paper", "sliding", "mesh"])
+@pytest.fixture(params=["paper", "sliding", "mesh", "bodies"])
 def any_simulator(request: pytest.FixtureRequest, simulators: dict[str, Simulator]) -> Simulator:
-    """Of the default arm's capsules, of slides and primitives of every kind, and of meshes."""
+    """Of the default arm's capsules, of slides and primitives of every kind, and of meshes.
+
+    The last one is of the default arm among bodies of every shape.
+    """
     return simulators[request.param]

@@ -23,7 +23,7 @@ tools = np.array([simulator.arm.tool_position(start) for start in starts])
 
 figure, axes = plt.subplots(figsize=(6.4, 6.0), layout="constrained")
 for bench in simulator.scene.obstacles:
-    corner, size = bench.lower[1::-1], bench.size[1::-1]
+    corner, size = bench.lower[1::-1], bench.body.size[1::-1]
     axes.add_patch(Rectangle(corner, *size, color="#c9d0d6", zorder=0))
 axes.scatter(tools[:, 1], tools[:, 0], s=5, color="#0072b2", label="tool point at the start")
 axes.scatter(goals[:, 1], goals[:, 0], s=5, color="#d55e00", label="goal")

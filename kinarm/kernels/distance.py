@@ -32,12 +32,6 @@ def between_segments(a: Vector, b: Vector, c: Vector, d: Vector) -> Vector:
 
 
 @inlined
-def turned_back(point: Vector, cosine: float, sine: float) -> Vector:
-    """Coordinates of a point or direction along axes turned about z."""
-    return cosine * point[0] + sine * point[1], cosine * point[1] - sine * point[0], point[2]
-
-
-@inlined
 def closest_to_box(a: Vector, b: Vector, lower: Vector, upper: Vector) -> float:
     """Where on the segment ab, from 0 to 1, it is (nearly) closest to a box.
 

@@ -7,7 +7,11 @@ from kinarm.kernels.compiling import Array, Vector, helper, inlined, kernel
 from kinarm.kernels.elementary import sine_cosine
 
 POSE = 16
-"""Entries of a pose: quaternion w x y z, rotation matrix, position."""
+"""Entries of a pose: quaternion w x y z, rotation matrix, position.
+
+Bodies of the scene have a size and a rounding instead of the quaternion
+(`kinarm.contact_shapes.ContactShapes`).
+"""
 
 
 @helper
@@ -92,6 +96,22 @@ def rotated_back(poses: Array, frame: int, x: float, y: float, z: float) -> Vect
         poses[frame, 5] * x + poses[frame, 8] * y + poses[frame, 11] * z,
         poses[frame, 6] * x + poses[frame, 9] * y + poses[frame, 12] * z,
     )
+
+
+@inlined
+def to_frame(poses: Array, frame: int, point: Vector) -> Vector:
+    """Map a point of the world to a frame."""
+    x, y, z = point[0] - poses[frame, 13], point[1] - poses[frame, 14], point[2] - poses[frame, 15]
+    return rotated_back(poses, frame, x, y, z)
+
+
+@inlined
+def place_bodies(placed: Array, poses: Array) -> None:
+    """Fill in the rows of the scene's bodies, which come last."""
+    first = poses.shape[0] - placed.shape[0]
+    for body in range(placed.shape[0]):
+        for i in range(POSE):
+            poses[first + body, i] = placed[body, i]
 
 
 @inlined

@@ -3,11 +3,11 @@
 A rounded polytope, the hull of a few corners widened by a radius, encloses each
 body. A pair's plane lies above its first body, the carrier, and moves with it;
 the least height of the second, the mover, above it bounds their distance from
-below. The ground's plane is its surface.
+below. A half-space's plane is its surface.
 
-A plane has five entries: unit normal x, y, z in the joint frame that carries
-it, offset along the normal, and the mover's least height when last asked for
-[m].
+A plane has five entries: unit normal x, y, z in the frame that carries it (the
+world's for bodies of the scene), offset along the normal, and the mover's least
+height when last asked for [m].
 
 The best plane follows from the distance algorithm of Gilbert, Johnson and Keerthi. In the carrier's
 frame it looks for the point closest to the origin of all differences of points of mover and
@@ -19,10 +19,10 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from kinarm.contact_shapes import GROUND, ContactShapes
+from kinarm.contact_shapes import BETWEEN_CAPSULES, WITH_HALFSPACE, ContactShapes
 from kinarm.kernels.compiling import Array, Vector, helper, inlined
 from kinarm.kernels.distance import between_segments, shrink
-from kinarm.kernels.kinematics import rotated, rotated_back, to_world
+from kinarm.kernels.kinematics import rotated, rotated_back, to_frame, to_world
 from kinarm.kernels.lanes import select
 
 EVERYDAY, FINE = 0, 1
@@ -45,11 +45,27 @@ COARSE = 0.02
 
 
 @inlined
+def is_placed(shapes: ContactShapes, frame: int, poses: Array) -> bool:
+    """Whether a frame is that of a body of the scene, whose row has a size."""
+    return frame >= poses.shape[0] - shapes.placed.shape[0]
+
+
+@inlined
 def axis_in_world(shapes: ContactShapes, body: int, poses: Array) -> tuple[Vector, Vector]:
     """End points of the axis of a body's capsule in the world [m]."""
     link, axis = shapes.bodies[body, 2], shapes.capsules[body]
+    if is_placed(shapes, link, poses):
+        half = poses[link, 2]
+        return to_world(poses, link, 0.0, 0.0, -half), to_world(poses, link, 0.0, 0.0, half)
     start = to_world(poses, link, axis[0], axis[1], axis[2])
     return start, to_world(poses, link, axis[3], axis[4], axis[5])
+
+
+@inlined
+def surface(poses: Array, frame: int) -> tuple[float, float, float, float]:
+    """Outer normal of the half-space of a frame, in the world, and offset along it [m]."""
+    x, y, z = poses[frame, 6], poses[frame, 9], poses[frame, 12]
+    return x, y, z, x * poses[frame, 13] + y * poses[frame, 14] + z * poses[frame, 15]
 
 
 @inlined
@@ -70,8 +86,7 @@ def height_above(
 
     The level, `EVERYDAY` or `FINE`, is that of the mover's polytope.
     """
-    carrier, mover = shapes.planes[pair, 0], shapes.proxies[pair, level, 1]
-    base = 0 if carrier == GROUND else shapes.bodies[carrier, 2]
+    base, mover = shapes.planes[pair, 4], shapes.proxies[pair, level, 1]
     link = shapes.bodies[mover, 2]
     x, y, z = rotated(poses, base, plane[row, 0], plane[row, 1], plane[row, 2])
     along = (
@@ -87,27 +102,39 @@ def height_above(
 def propose(shapes: ContactShapes, pair: int, poses: Array, plane: Array, row: int) -> None:
     """Fill in a row of the planes with a likely plane for a pair, without its height.
 
-    Its normal leads from the carrier's axis, or the box about an obstacle, to the mover's axis.
+    Its normal leads from the carrier's axis, or the box about it, to the mover's axis.
     """
-    carrier, mover = shapes.planes[pair, 0], shapes.planes[pair, 1]
-    if carrier == GROUND:
-        plane[row, 0], plane[row, 1], plane[row, 2], plane[row, OFFSET] = 0.0, 0.0, 1.0, 0.0
+    kind, carrier, mover = shapes.pairs[pair, 0], shapes.planes[pair, 0], shapes.planes[pair, 1]
+    frame = shapes.bodies[carrier, 2]
+    if kind == WITH_HALFSPACE:
+        x, y, z, offset = surface(poses, frame)
+        plane[row, 0], plane[row, 1], plane[row, 2], plane[row, OFFSET] = x, y, z, offset
         return
     a, b = axis_in_world(shapes, mover, poses)
-    if carrier < shapes.capsules.shape[0]:
+    if kind == BETWEEN_CAPSULES:
         c, d = axis_in_world(shapes, carrier, poses)
         x, y, z = between_segments(a, b, c, d)
-        x, y, z = rotated_back(poses, shapes.bodies[carrier, 2], x, y, z)
+        x, y, z = rotated_back(poses, frame, x, y, z)
     else:
-        lower, upper = shapes.extents[carrier, 0], shapes.extents[carrier, 1]
-        x, y, z = from_box(a, b, (lower[0], lower[1], lower[2]), (upper[0], upper[1], upper[2]))
+        sx, sy, sz = poses[frame, 0], poses[frame, 1], poses[frame, 2]
+        low, high = shapes.extents[carrier, 0], shapes.extents[carrier, 1]
+        lower = (sx * low[0], sy * low[1], sz * low[2])
+        upper = (sx * high[0], sy * high[1], sz * high[2])
+        a, b = to_frame(poses, frame, a), to_frame(poses, frame, b)
+        x, y, z = from_box(a, b, lower, upper)
     norm = math.sqrt(x * x + y * y + z * z)
     inside = norm < 1e-9
     x, y, z = x / norm, y / norm, z / norm
     x, y, z = select(inside, 0.0, x), select(inside, 0.0, y), select(inside, 1.0, z)
-    plane[row, 0], plane[row, 1], plane[row, 2] = x, y, z
     proxy = shapes.proxies[pair, EVERYDAY, 0]
-    plane[row, OFFSET] = shapes.rounding[proxy] - lowest(shapes, proxy, -x, -y, -z)
+    if is_placed(shapes, frame, poses):
+        sx, sy, sz = poses[frame, 0], poses[frame, 1], poses[frame, 2]
+        above = poses[frame, 3] - lowest(shapes, proxy, -sx * x, -sy * y, -sz * z)
+        x, y, z = rotated(poses, frame, x, y, z)
+        above += x * poses[frame, 13] + y * poses[frame, 14] + z * poses[frame, 15]
+    else:
+        above = shapes.rounding[proxy] - lowest(shapes, proxy, -x, -y, -z)
+    plane[row, 0], plane[row, 1], plane[row, 2], plane[row, OFFSET] = x, y, z, above
 
 
 @inlined
@@ -170,25 +197,31 @@ def separate(
         poses[link, 14] - poses[base, 14],
         poses[link, 15] - poses[base, 15],
     )
-    corners, rounding = shapes.corners, shapes.rounding[carrier] + shapes.rounding[mover]
+    corners, widened, sx, sy, sz = shapes.corners, shapes.rounding[carrier], 1.0, 1.0, 1.0
     nx, ny, nz = plane[0, 0], plane[0, 1], plane[0, 2]
+    placed = is_placed(shapes, base, poses)
+    if placed:
+        sx, sy, sz, widened = poses[base, 0], poses[base, 1], poses[base, 2], poses[base, 3]
+        nx, ny, nz = rotated_back(poses, base, nx, ny, nz)
+    rounding = widened + shapes.rounding[mover]
     best, size, norm = -math.inf, 0, math.inf
     for _ in range(CORNERS_TRIED):
         # The mover's lowest corner, and the carrier's highest.
         x, y, z = rotated_back(relative, 0, nx, ny, nz)
         low = lowest_corner(shapes.corners, shapes.bodies, mover, x, y, z)
-        high = lowest_corner(shapes.corners, shapes.bodies, carrier, -nx, -ny, -nz)
+        high = lowest_corner(shapes.corners, shapes.bodies, carrier, -sx * nx, -sy * ny, -sz * nz)
+        hx, hy, hz = sx * corners[high, 0], sy * corners[high, 1], sz * corners[high, 2]
         x, y, z = corners[low, 0], corners[low, 1], corners[low, 2]
         wx = relative[0, 13] + relative[0, 4] * x + relative[0, 5] * y + relative[0, 6] * z
         wy = relative[0, 14] + relative[0, 7] * x + relative[0, 8] * y + relative[0, 9] * z
         wz = relative[0, 15] + relative[0, 10] * x + relative[0, 11] * y + relative[0, 12] * z
-        above = nx * corners[high, 0] + ny * corners[high, 1] + nz * corners[high, 2]
+        above = nx * hx + ny * hy + nz * hz
         gap = nx * wx + ny * wy + nz * wz - above
-        wx, wy, wz = wx - corners[high, 0], wy - corners[high, 1], wz - corners[high, 2]
+        wx, wy, wz = wx - hx, wy - hy, wz - hz
         if gap > best:
             best = gap
             plane[0, 0], plane[0, 1], plane[0, 2] = nx, ny, nz
-            plane[0, OFFSET] = above + shapes.rounding[carrier]
+            plane[0, OFFSET] = above + widened
         missing = norm - max(best, 0.0)
         if missing <= CLOSE or missing <= COARSE * (best - rounding) or norm <= rounding:
             break
@@ -198,5 +231,9 @@ def separate(
         if norm < CLOSE:
             break
         nx, ny, nz = x / norm, y / norm, z / norm
+    if placed:
+        x, y, z = rotated(poses, base, plane[0, 0], plane[0, 1], plane[0, 2])
+        plane[0, OFFSET] += x * poses[base, 13] + y * poses[base, 14] + z * poses[base, 15]
+        plane[0, 0], plane[0, 1], plane[0, 2] = x, y, z
     plane[0, GAP] = best - rounding
     return best - rounding

@@ -6,17 +6,17 @@ Along the step it is the least height of some corners, whose second derivative i
 *bend* c: at the share s it is at least (1 - s) h + s h' - s (1 - s) c / 2. Where that proves
 nothing, a better plane is taken, and then each configuration between.
 
-Contact is proven between capsules, obstacles and the ground, whose shapes are exact: two of their
+Contact is proven between capsules, boxes and half-spaces that equal their shapes: two of their
 points that are closer than the radii about them prove an overlap.
 """
 
 import math
 
 from kinarm.chain import Chain
-from kinarm.contact_shapes import BETWEEN_CAPSULES, GROUND, PLANE, WITH_GROUND, ContactShapes
+from kinarm.contact_shapes import BETWEEN_CAPSULES, PLANE, WITH_HALFSPACE, ContactShapes
 from kinarm.kernels.compiling import Array, helper, inlined
-from kinarm.kernels.distance import between_segments, closest_to_box, turned_back
-from kinarm.kernels.kinematics import forward_kinematics
+from kinarm.kernels.distance import between_segments, closest_to_box
+from kinarm.kernels.kinematics import forward_kinematics, to_frame
 from kinarm.kernels.lanes import any_lane, as_numbers, lane_bits, select
 from kinarm.kernels.planes import (
     EVERYDAY,
@@ -24,8 +24,10 @@ from kinarm.kernels.planes import (
     GAP,
     axis_in_world,
     height_above,
+    is_placed,
     propose,
     separate,
+    surface,
 )
 from kinarm.kernels.session import Alone, Block, put, take, take_rows
 
@@ -99,7 +101,7 @@ def renew_planes(
             at_start, at_end = block.height[pair], block.planes[pair, GAP]
             bound = min(at_end, at_start + share * (at_end - at_start)) - 0.125 * bend
             open_here = stale & ~is_apart(bound)
-            if shapes.planes[pair, 0] != GROUND and any_lane(open_here):
+            if shapes.pairs[pair, 0] != WITH_HALFSPACE and any_lane(open_here):
                 propose(shapes, pair, poses, block.planes, n_pairs)
                 at_start = height_above(shapes, pair, EVERYDAY, before, block.planes, n_pairs)
                 at_end = height_above(shapes, pair, EVERYDAY, poses, block.planes, n_pairs)
@@ -152,7 +154,7 @@ def prove_alone(
         bend = bends[pair, lane]
         before, after = heights[pair, lane], planes[pair, GAP, lane]
         unproven = open_configurations(before, after, bend, tested)
-        if unproven != 0 and shapes.planes[pair, 0] != GROUND:
+        if unproven != 0 and shapes.pairs[pair, 0] != WITH_HALFSPACE:
             if not at_start:
                 take(block.q, 0, lane, alone.q, 0)
                 forward_kinematics(chain, alone.q, 0, alone.before)
@@ -190,7 +192,7 @@ def is_proven_apart(
     """Whether its or a better plane proves a pair apart at ``alone.before``."""
     take(block.planes, pair, lane, alone.plane, 0)
     height = height_above(shapes, pair, FINE, alone.before, alone.plane, 0)
-    if not is_apart(height) and shapes.planes[pair, 0] != GROUND:
+    if not is_apart(height) and shapes.pairs[pair, 0] != WITH_HALFSPACE:
         height = separate(shapes, pair, alone.before, alone.relative, alone.simplex, alone.plane)
     return is_apart(height)
 
@@ -215,7 +217,7 @@ def prove_configuration(
     for pair in range(shapes.planes.shape[0]):
         if is_apart(planes[pair, GAP, lane]):
             continue
-        if shapes.planes[pair, 0] == GROUND:
+        if shapes.pairs[pair, 0] == WITH_HALFSPACE:
             free = False
             continue
         take(block.planes, pair, lane, plane, 0)
@@ -250,8 +252,17 @@ def prove_configurations(
 @inlined
 def is_exact(shapes: ContactShapes, pair: int) -> bool:
     """Whether the shapes of a pair are known exactly."""
-    kind, first, second = shapes.pairs[pair, 0], shapes.pairs[pair, 1], shapes.pairs[pair, 2]
-    return shapes.exact[first] and (kind != BETWEEN_CAPSULES or shapes.exact[second])
+    return shapes.exact[shapes.pairs[pair, 1]] and shapes.exact[shapes.pairs[pair, 2]]
+
+
+@inlined
+def radius_of(shapes: ContactShapes, body: int, poses: Array) -> float:
+    """Radius of a body's capsule [m]."""
+    frame = shapes.bodies[body, 2]
+    radius = 0.0 * poses[0, 13] + shapes.capsules[body, 6]
+    if is_placed(shapes, frame, poses):
+        radius = poses[frame, 3]
+    return radius
 
 
 @helper
@@ -259,23 +270,23 @@ def overlap(shapes: ContactShapes, pair: int, poses: Array) -> float:
     """Lower bound of an exact pair's overlap [m]; negative if apart."""
     kind, first, second = shapes.pairs[pair, 0], shapes.pairs[pair, 1], shapes.pairs[pair, 2]
     a, b = axis_in_world(shapes, first, poses)
-    radius = shapes.capsules[first, 6]
-    if kind == WITH_GROUND:
-        return radius - min(a[2], b[2])
+    radius, frame = shapes.capsules[first, 6], shapes.bodies[second, 2]
+    if kind == WITH_HALFSPACE:
+        x, y, z, offset = surface(poses, frame)
+        start, end = x * a[0] + y * a[1] + z * a[2], x * b[0] + y * b[1] + z * b[2]
+        return radius - (min(start, end) - offset)
     if kind == BETWEEN_CAPSULES:
         c, d = axis_in_world(shapes, second, poses)
         x, y, z = between_segments(a, b, c, d)
-        radius += shapes.capsules[second, 6]
+        radius += radius_of(shapes, second, poses)
     else:
-        low, high = shapes.boxes[second, 0], shapes.boxes[second, 1]
-        lower, upper = (low[0], low[1], low[2]), (high[0], high[1], high[2])
-        cosine, sine = shapes.turns[second, 0], shapes.turns[second, 1]
-        a, b = turned_back(a, cosine, sine), turned_back(b, cosine, sine)
-        t = closest_to_box(a, b, lower, upper)
+        hx, hy, hz = poses[frame, 0], poses[frame, 1], poses[frame, 2]
+        a, b = to_frame(poses, frame, a), to_frame(poses, frame, b)
+        t = closest_to_box(a, b, (-hx, -hy, -hz), (hx, hy, hz))
         x, y, z = a[0] + t * (b[0] - a[0]), a[1] + t * (b[1] - a[1]), a[2] + t * (b[2] - a[2])
-        x -= min(max(x, lower[0]), upper[0])
-        y -= min(max(y, lower[1]), upper[1])
-        z -= min(max(z, lower[2]), upper[2])
+        x -= min(max(x, -hx), hx)
+        y -= min(max(y, -hy), hy)
+        z -= min(max(z, -hz), hz)
     return radius - math.sqrt(x * x + y * y + z * z)
 
 

@@ -46,7 +46,10 @@ def add_reward(
 
 @inlined
 def observe(tool: Array, poses: Array, goals: Array, row: int, observations: Array) -> float:
-    """Write a row of observations; return the distance to the goal [m]."""
+    """Write a row of observations; return the distance to the goal [m].
+
+    Takes the poses of the joint frames alone.
+    """
     point = to_world(poses, poses.shape[0] - 1, tool[0], tool[1], tool[2])
     write_observation(poses, point, goals, row, observations, 0)
     dx, dy, dz = goals[row, 0] - point[0], goals[row, 1] - point[1], goals[row, 2] - point[2]

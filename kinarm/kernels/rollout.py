@@ -55,7 +55,8 @@ def begin(counters: NDArray[np.int64], session: Session, rows: NDArray[np.int64]
             put(episodes.goal, e, block.goal, 0, lane)
         forward_kinematics(chain, block.q, 0, block.after)
         free = prove_configurations(shapes, 0, filled, block, alone)
-        block.distance[0] = observe(chain.tool, block.after, block.goal, 0, block.observation)
+        arm = block.after[: q.shape[1] + 1]
+        block.distance[0] = observe(chain.tool, arm, block.goal, 0, block.observation)
         # Store all that an episode begins with.
         for lane in range(filled):
             e = rows[start + lane]
@@ -152,7 +153,7 @@ def advance(counters: NDArray[np.int64], session: Session) -> int:
         changed = False
         block.cleared[0] = 0.0
         nearer = block.distance[0]
-        after = observe(tool, poses, block.goal, 0, block.observation)
+        after = observe(tool, poses[: n_joints + 1], block.goal, 0, block.observation)
         block.distance[0] = after
         block.steps[0] += 1.0
         reached, never = after <= rules.tolerance, after < 0.0

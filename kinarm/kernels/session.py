@@ -10,8 +10,8 @@ from numba import types
 from kinarm.chain import Chain
 from kinarm.contact_shapes import PLANE, ContactShapes
 from kinarm.episodes import Control, Episodes, Rules
-from kinarm.kernels.compiling import Array, inlined
-from kinarm.kernels.kinematics import POSE
+from kinarm.kernels.compiling import Array, inlined, lean_kernel
+from kinarm.kernels.kinematics import POSE, place_bodies
 from kinarm.kernels.lanes import LANES, as_numbers, instruction, lanes
 from kinarm.kernels.records import Fixed, Layout, Record, Shapes, table
 
@@ -37,6 +37,7 @@ def layouts(
     n_observations: int = 0,
     n_pairs: int = 0,
     n_terms: int = 0,
+    n_placed: int = 0,
     widest: int = 0,
     own: int = 0,
     summed: int = 0,
@@ -48,7 +49,7 @@ def layouts(
 
     Parameters
     ----------
-    n_joints, n_actuated, n_observations, n_pairs, n_terms, widest : int
+    n_joints, n_actuated, n_observations, n_pairs, n_terms, n_placed, widest : int
         Sizes of arm, scene, reward and networks; 0 if a kernel does without.
     own : int
         Parameters of an episode's own network.
@@ -64,8 +65,7 @@ def layouts(
         "observation": (ONE, n_observations),
         "seen": (ONE, n_observations),
         # Poses before and after the step, which swap from step to step.
-        "before": (n_joints + 1, Fixed(POSE)),
-        "after": (n_joints + 1, Fixed(POSE)),
+        **dict.fromkeys(("before", "after"), (n_joints + 1 + n_placed, Fixed(POSE))),
         # Separating plane of each pair, with its height; the last row is work space.
         "planes": (n_pairs + 1, Fixed(PLANE)),
         # Height before the step, bend, and the bound of both [m].
@@ -88,8 +88,7 @@ def layouts(
     alone = {
         # A configuration, poses before the step or between and after it, and a plane.
         "q": (ONE, n_joints),
-        "before": (n_joints + 1, Fixed(POSE)),
-        "after": (n_joints + 1, Fixed(POSE)),
+        **dict.fromkeys(("before", "after"), (n_joints + 1 + n_placed, Fixed(POSE))),
         "plane": (ONE, Fixed(PLANE)),
         # See `kinarm.kernels.planes.separate`.
         "relative": (ONE, Fixed(POSE)),
@@ -101,6 +100,15 @@ def layouts(
     in_lanes["row"] = (types.int64, (Fixed(LANES),))
     numbers["listed"] = (types.int64, (n_pairs + 1, Fixed(2)))
     return Layout("Block", in_lanes), Layout("Alone", numbers)
+
+
+@lean_kernel
+def furnish(placed: Array, block: Block, alone: Alone) -> None:
+    """Put the scene's bodies into all poses of a work space."""
+    place_bodies(placed, block.before)
+    place_bodies(placed, block.after)
+    place_bodies(placed, alone.before)
+    place_bodies(placed, alone.after)
 
 
 @inlined
@@ -199,10 +207,12 @@ class Session(Record):
             n_observations=n_observations,
             n_pairs=self.episodes.planes.shape[1],
             n_terms=rules.values.reward.shape[0],
+            n_placed=shapes.values.placed.shape[0],
             widest=max(self.control.layers.tolist()[1:], default=1),
             own=weights.shape[1] if weights.shape[0] > 1 else 0,
             summed=n_observations if len(self.episodes.moments) > 0 else 0,
         )
+        furnish(shapes.values.placed, *space)
         parts = SessionFields(chain, shapes, rules, control, episodes, *space)
         super().__init__(*table(parts), parts)
         self._others: list[Session] = []

@@ -229,8 +229,7 @@ def draw_surroundings(window: Visualizer, scene: Scene) -> None:
         material = LineBasicMaterial(color=GRID_COLOUR).lower({})
         del material["uuid"]
         _show(window["grid"], "LineSegments", lines, material, np.eye(4))
-    for number, obstacle in enumerate(scene.obstacles):
-        body, *slab = obstacle_meshes(obstacle, scene)
+    for number, (body, *slab) in enumerate(obstacle_meshes(scene)):
         if slab:
             put(window[f"obstacles/{number}/top"], GOAL_SLAB, *slab)
         put(window[f"obstacles/{number}/body"], OBSTACLE, body)

@@ -22,7 +22,7 @@ from kinarm._files import write_text
 from kinarm.arm import Arm
 from kinarm.arm_specification import ArmSpecification
 from kinarm.collision import ContactModel
-from kinarm.contact_shapes import core
+from kinarm.enclosures import core
 from kinarm.errors import InvalidInputError
 from kinarm.problem import ProblemLike
 from kinarm.recording import Recording, record_path

@@ -5,8 +5,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from kinarm.scene import GoalRegion, Obstacle, Scene
-from kinarm.viewer.meshes import Mesh, box
+from kinarm.bodies import Body
+from kinarm.meshes import coal_shape
+from kinarm.scene import GoalRegion, Scene
+from kinarm.viewer.meshes import Mesh, box, from_coal
 
 Array = NDArray[np.float64]
 
@@ -16,6 +18,7 @@ FLOOR_RADIUS, GRID_RADIUS, GRID_STEP = 12.0, 2.0, 0.25
 SLAB_THICKNESS = 0.02
 """Thickness of the slab on an obstacle that carries goals [m]."""
 
+SURFACE_SIDES = 64
 TRACE_RADIUS = 0.0042
 TRACE_SIDES = 6
 FLASH_RADIUS = 0.025
@@ -101,27 +104,44 @@ def to_srgb(linear: ArrayLike) -> Array:
     )
 
 
-def obstacle_meshes(obstacle: Obstacle, scene: Scene) -> list[Mesh]:
-    """An obstacle; a bench of body and slab if goals lie on it."""
-    size, centre = obstacle.size, obstacle.centre
-    if any(_lies_on(region, obstacle, scene.cube_edge) for region in scene.goal_regions):
+def obstacle_meshes(scene: Scene) -> list[list[Mesh]]:
+    """The obstacles; a box is a bench of body and slab if goals lie on it."""
+    return [_obstacle(body, scene) for body in scene.bodies[: len(scene.obstacles)]]
+
+
+def _obstacle(body: Body, scene: Scene) -> list[Mesh]:
+    size = np.array(body.size)
+    if body.shape == "halfspace":
+        parts = [_surface()]
+    elif body.shape != "box":
+        parts = [from_coal(coal_shape(body))]
+    elif any(_lies_on(region, body, scene.cube_edge) for region in scene.goal_regions):
         top = min(SLAB_THICKNESS, size[2] / 2)
         inset = np.minimum(0.03, 0.2 * size[:2])
-        body = box((*size[:2] - inset, size[2] - top)).moved((0, 0, -top / 2))
+        below = box((*size[:2] - inset, size[2] - top)).moved((0, 0, -top / 2))
         slab = box((*size[:2], top), 0.2 * top).moved((0, 0, (size[2] - top) / 2))
-        parts = [body, slab]
+        parts = [below, slab]
     else:
         parts = [box(size, 0.04 * size.min())]
-    return [part.moved(centre, obstacle.rotation) for part in parts]
+    return [part.moved(body.position, body.rotation) for part in parts]
 
 
-def _lies_on(region: GoalRegion, obstacle: Obstacle, edge: float) -> bool:
-    """Whether cubes of an edge [m], centred in a region, lie on an obstacle."""
-    gap = region.lower[2] - obstacle.upper[2]
-    half = np.abs(obstacle.rotation) @ obstacle.size / 2
-    lower, upper = obstacle.centre - half, obstacle.centre + half
+def _surface() -> Mesh:
+    """Part of a half-space's plane, which is seen from outside alone."""
+    angles = np.linspace(0, 2 * np.pi, SURFACE_SIDES, endpoint=False)
+    around = np.stack([np.cos(angles), np.sin(angles), np.zeros(SURFACE_SIDES)], axis=1)
+    rim = np.arange(1, SURFACE_SIDES + 1)
+    faces = np.stack([np.zeros_like(rim), rim, np.roll(rim, -1)], axis=1)
+    return Mesh(np.vstack([np.zeros(3), GRID_RADIUS * around]), faces)
+
+
+def _lies_on(region: GoalRegion, body: Body, edge: float) -> bool:
+    """Whether cubes of an edge [m], centred in a region, lie on an upright box."""
+    half = np.abs(body.rotation) @ np.array(body.size) / 2
+    lower, upper = np.array(body.position) - half, np.array(body.position) + half
     above = all(region.lower[k] < upper[k] and lower[k] < region.upper[k] for k in (0, 1))
-    return above and 0 <= gap <= edge
+    upright = body.rotation[2, 2] == 1.0
+    return upright and above and 0 <= region.lower[2] - round(upper[2], 12) <= edge
 
 
 def cube_mesh(scene: Scene) -> Mesh:

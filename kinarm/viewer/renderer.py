@@ -190,8 +190,8 @@ class TriangleScene:
         self._arm, self._data, self._links = arm, arm.model.createData(), link_joints(arm)
         standing = [
             (0, finish, mesh)
-            for obstacle in scene.obstacles
-            for finish, mesh in zip((BODY, SLAB), obstacle_meshes(obstacle, scene), strict=False)
+            for meshes in obstacle_meshes(scene)
+            for finish, mesh in zip((BODY, SLAB), meshes, strict=False)
         ]
         parts = [*standing, *arm_parts(arm), (arm.n_joints + 1, CUBE, cube_mesh(scene))]
         self._arm_owners = {part[:2] for part in arm_parts(arm)}

@@ -129,4 +129,5 @@ class Prover:
     def _space(self) -> tuple[Array, Boxes]:
         """Space for boxes that wait and boxes that are examined."""
         n, n_joints = self._simulator.n_actions, self._simulator.arm.n_joints
-        return np.empty((WAITING, 2 * n + 1)), layout(n, n_joints).record()
+        n_placed = len(self._simulator.world.contact_model.shapes.placed)
+        return np.empty((WAITING, 2 * n + 1)), layout(n, n_joints, n_placed).record()

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from kinarm.arm import Arm
-from kinarm.contact_shapes import enclosing_capsule
+from kinarm.enclosures import enclosing_capsule
 from kinarm.errors import ArmError, KinarmError
 from kinarm.problem import ReachProblem
 from kinarm.simulator import Simulator

@@ -8,7 +8,7 @@ from simulators import changed
 
 from kinarm.arm import Arm
 from kinarm.collision import ContactModel, make_verdicts_reliable, start_anew
-from kinarm.contact_shapes import BETWEEN_CAPSULES, WITH_GROUND
+from kinarm.contact_shapes import WITH_HALFSPACE
 from kinarm.episodes import COLLISION, PAUSED, Control
 from kinarm.kernels.rollout import advance
 from kinarm.scene import Scene
@@ -106,8 +106,9 @@ class TestTravel:
         old, new = link_poses(any_simulator, before), link_poses(any_simulator, after)
         tightest = 0.0
         for column, (kind, first, second) in enumerate(shapes.pairs):
-            mover = second if kind == BETWEEN_CAPSULES else first
-            base = shapes.bodies[first, 2] if kind == BETWEEN_CAPSULES else 0
+            within = second < arm.geometry.ngeoms
+            mover = second if within else first
+            base = shapes.bodies[first, 2] if within else 0
             points = []
             for poses in (old, new):
                 world = capsule_points(any_simulator, mover, poses)
@@ -117,7 +118,7 @@ class TestTravel:
                 ]
                 points.append(np.array(local))
             change = points[1] - points[0]
-            if kind == WITH_GROUND:
+            if kind == WITH_HALFSPACE:
                 change = change[..., 2:]
             motion = np.linalg.norm(change, axis=2).max(axis=1)
             bound = turn @ shapes.travel[:, column]
@@ -127,7 +128,7 @@ class TestTravel:
 
     def test_turning_the_base_leaves_heights_alone(self, simulator):
         shapes = simulator.world.contact_model.shapes
-        ground = shapes.pairs[:, 0] == WITH_GROUND
+        ground = shapes.pairs[:, 0] == WITH_HALFSPACE
         np.testing.assert_array_equal(shapes.travel[0, ground], 0)
         assert (shapes.travel[0, ~ground & (shapes.bodies[shapes.pairs[:, 1], 2] > 1)] >= 0).all()
 

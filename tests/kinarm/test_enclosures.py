@@ -6,7 +6,7 @@ import pinocchio as pin
 import pytest
 from scipy.optimize import linprog
 
-from kinarm.contact_shapes import FEW, MANY, enclosing_capsule, enclosing_polytope
+from kinarm.enclosures import FEW, MANY, enclosing_capsule, enclosing_polytope
 from kinarm.errors import ArmError
 
 PLACED = pin.SE3(pin.Quaternion(0.5, 0.1, -0.7, 0.3).normalized(), np.array([0.1, -0.2, 0.3]))

@@ -52,8 +52,8 @@ def test_a_mounted_arm_moves_as_the_other_one():
 def test_contact_is_that_of_a_scene_that_is_moved_back():
     """A post that is turned, and an arm that is turned as much: as if neither were."""
     angle = 0.7
-    centre = rotation_matrix((0, 0, angle)) @ POST.centre
-    half = POST.size / 2
+    centre = rotation_matrix((0, 0, angle)) @ np.array(POST.body.position)
+    half = np.array(POST.body.size) / 2
     post = Obstacle(name="post", lower=centre - half, upper=centre + half, yaw=angle)
     turned = Scene(obstacles=(post,), goal_regions=(REGION,), mount=Mount(rpy=(0, 0, angle)))
     worlds = [World(problem(scene)) for scene in (turned, moved_scene())]
@@ -69,7 +69,10 @@ def test_a_turned_box_is_where_coal_has_it(yaw):
     scene = moved_scene(yaw=yaw)
     model = ContactModel.build(Arm.load("paper"), scene)
     (shape,) = [each for each in model.geometry.geometryObjects if each.name == "post"]
-    corners = model.shapes.corners[slice(*model.shapes.bodies[model.body_names.index("post"), :2])]
+    shapes, index = model.shapes, model.body_names.index("post")
+    row = shapes.placed[index - model.arm.geometry.ngeoms]
+    corners = shapes.corners[slice(*shapes.bodies[index, :2])] * row[:3] @ row[4:13].reshape(3, 3).T
+    corners += row[13:]
     box = coal.CollisionObject(shape.geometry, shape.placement)
     for corner in corners:
         ball = coal.CollisionObject(coal.Sphere(1e-6), pin.SE3(np.eye(3), corner))

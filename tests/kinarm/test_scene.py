@@ -37,8 +37,8 @@ class TestPapersScene:
 
 
 def test_size_and_centre():
-    np.testing.assert_allclose(obstacle().size, [1, 1.5, 0.4])
-    np.testing.assert_allclose(obstacle().centre, [0.5, -0.25, 0.2])
+    np.testing.assert_allclose(obstacle().body.size, [1, 1.5, 0.4])
+    np.testing.assert_allclose(obstacle().body.position, [0.5, -0.25, 0.2])
 
 
 @pytest.mark.parametrize(

@@ -184,11 +184,11 @@ def test_boxes_are_turned():
     region = GoalRegion(name="over", lower=(0.4, 0.75, 0.52), upper=(0.6, 0.85, 0.52))
     turned = Obstacle(name="a", lower=(0.1, 0.3, 0.0), upper=(0.9, 0.5, 0.5), yaw=np.pi / 2)
     scene = Scene(obstacles=(turned,), goal_regions=(replace(region, lower=(0.4, 0.7, 0.52)),))
-    body, top = obstacle_meshes(turned, scene)
+    ((body, top),) = obstacle_meshes(scene)
     np.testing.assert_allclose(top.vertices.min(axis=0), (0.4, 0.0, 0.48), atol=1e-9)
     np.testing.assert_allclose(top.vertices.max(axis=0), (0.6, 0.8, 0.5), atol=1e-9)
     aside = replace(region, lower=(0.7, 0.3, 0.52), upper=(0.9, 0.5, 0.52))
-    assert len(obstacle_meshes(turned, replace(scene, goal_regions=(aside,)))) == 1
+    assert len(obstacle_meshes(replace(scene, goal_regions=(aside,)))[0]) == 1
     assert volume(body) > 0
 
 

@@ -16,7 +16,7 @@ from numba import types
 from kinarm.chain import Chain, MotionBounds
 from kinarm.contact_shapes import ContactShapes
 from kinarm.kernels.compiling import Array, Vector, inlined, lean_kernel
-from kinarm.kernels.kinematics import POSE, point_jacobian
+from kinarm.kernels.kinematics import POSE, place_bodies, point_jacobian
 from kinarm.kernels.lanes import LANES, any_lane, as_numbers, lane_bits, lanes
 from kinarm.kernels.records import Fixed, Layout
 from kinarm.kernels.session import ONE, THREE, put, take
@@ -47,10 +47,11 @@ Boxes = Any
 
 
 @cache
-def layout(n: int, n_joints: int) -> Layout:
-    """Work space for boxes of the first n joints: arrays of lanes, but for ``lever``.
+def layout(n: int, n_joints: int, n_placed: int) -> Layout:
+    """Work space for boxes of the first n joints, in a scene of ``n_placed`` bodies.
 
-    `kinarm.kernels.lanes.as_numbers` adds an axis, that of the boxes.
+    All are arrays of lanes, but for ``lever``; `kinarm.kernels.lanes.as_numbers`
+    adds an axis, that of the boxes.
     """
     shapes = {
         # A row of the stack: lower and upper corner [rad or m], and proven distance [m].
@@ -60,7 +61,7 @@ def layout(n: int, n_joints: int) -> Layout:
         "share": (ONE,),
         # Centre, and a configuration tried [rad or m]; their poses.
         **dict.fromkeys(("q", "tried"), (ONE, n_joints)),
-        **dict.fromkeys(("poses", "between"), (n_joints + 1, Fixed(POSE))),
+        **dict.fromkeys(("poses", "between"), (n_joints + 1 + n_placed, Fixed(POSE))),
         # Distances from the goal of these two [m].
         "distance": (Fixed(2),),
         # Jacobians of the tool and of a point of the arm [m/rad, or m/m].
@@ -182,6 +183,8 @@ def search(
     places = (as_numbers(block.q), as_numbers(block.tried))
     found, lower_bounds = as_numbers(block.distance), as_numbers(box)
     shares = as_numbers(block.share)
+    place_bodies(shapes.placed, block.poses)
+    place_bodies(shapes.placed, block.between)
     for i in range(n_joints):
         block.q[0, i] = start[i]
         block.tried[0, i] = start[i]

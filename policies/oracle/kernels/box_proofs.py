@@ -10,9 +10,9 @@ tool, and a bound R of what is of third order. A second bound needs no tool: the
 origin of the k-th joint moves no farther than its swing, and the tool is no
 farther from it than its length.
 
-Two points, of the axes of bodies or of obstacle or ground, prove contact
+Two points, of the axes of bodies or of a box or half-space, prove contact
 throughout a box if they stay closer than the radii. Bodies that are only
-enclosed by a capsule prove nothing.
+enclosed by such shapes prove nothing.
 
 No branch depends on values, so that lanes may hold a box each.
 """
@@ -25,11 +25,17 @@ from numpy.typing import NDArray
 from kinarm.chain import Chain, MotionBounds
 from kinarm.contact_shapes import BETWEEN_CAPSULES, WITH_BOX, ContactShapes
 from kinarm.kernels.compiling import Array, Vector, helper, inlined
-from kinarm.kernels.distance import between_segments, closest_to_box, turned_back
-from kinarm.kernels.kinematics import forward_kinematics, point_jacobian, to_world
+from kinarm.kernels.distance import between_segments, closest_to_box
+from kinarm.kernels.kinematics import (
+    forward_kinematics,
+    point_jacobian,
+    rotated_back,
+    to_frame,
+    to_world,
+)
 from kinarm.kernels.lanes import any_lane, select
 from kinarm.kernels.planes import axis_in_world
-from kinarm.kernels.proof import DEPTH, is_exact
+from kinarm.kernels.proof import DEPTH, is_exact, radius_of
 
 SWEEPS = 3
 """Passes of the descent over the joints."""
@@ -239,9 +245,8 @@ def deepest_share(a: Vector, b: Vector, lower: Vector, upper: Vector) -> float:
 @inlined
 def axis_of(shapes: ContactShapes, i: int, poses: Array) -> tuple[Vector, Vector, float]:
     """End points of a capsule's axis in the world, and half its length."""
-    axis = shapes.capsules[i]
     a, b = axis_in_world(shapes, i, poses)
-    x, y, z = axis[3] - axis[0], axis[4] - axis[1], axis[5] - axis[2]
+    x, y, z = b[0] - a[0], b[1] - a[1], b[2] - a[2]
     return a, b, 0.5 * math.sqrt(x * x + y * y + z * z)
 
 
@@ -260,8 +265,7 @@ def overlaps(
     Its centre has the ``poses``, its half-widths are ``share`` times ``half``. Only what is
     ``wanted`` is examined. The Jacobian, shape (3, n), is work space.
     """
-    bodies, capsules, boxes, turns = shapes.bodies, shapes.capsules, shapes.boxes, shapes.turns
-    prismatic, pairs, travel = chain.prismatic, shapes.pairs, shapes.travel
+    bodies, pairs, travel, prismatic = shapes.bodies, shapes.pairs, shapes.travel, chain.prismatic
     n = half.shape[0]
     proven: bool = wanted & (half[0] < 0.0)
     for pair in range(pairs.shape[0]):
@@ -271,10 +275,10 @@ def overlaps(
         a, b, reach = axis_of(shapes, i, poses)
         middle = along(a, b, 0.5)
         # Coal, whose iterations are no more precise, decides what just touches.
-        radius = capsules[i, 6] - DEPTH
+        radius = shapes.capsules[i, 6] - DEPTH
         if kind == BETWEEN_CAPSULES:
             c, d, beyond = axis_of(shapes, j, poses)
-            other, radius = along(c, d, 0.5), radius + capsules[j, 6]
+            other, radius = along(c, d, 0.5), radius + radius_of(shapes, j, poses)
             x, y, z = middle[0] - other[0], middle[1] - other[1], middle[2] - other[2]
             # Most pairs are far apart at the centre.
             reach += beyond + radius
@@ -287,24 +291,23 @@ def overlaps(
                 gap += share * half[axis] * travel[axis, pair]
             proven = proven | (wanted & (gap < radius))
             continue
-        # A point deep in an obstacle stays in it longest. In the ground, a box without end, the
-        # lower end of the segment is deepest.
-        lower, upper = (-np.inf, -np.inf, -np.inf), (np.inf, np.inf, 0.0)
-        first = a[2] < b[2]
+        # A point deep in an obstacle stays in it longest. In a half-space, a box without end, the
+        # lower end of the segment is deepest. All of it along the edges of the box.
+        frame, none = bodies[j, 2], 0.0 * poses[0, 13]
+        far = none + np.inf
+        lower, upper = (-far, -far, -far), (far, far, none)
+        c, d = to_frame(poses, frame, a), to_frame(poses, frame, b)
+        first = c[2] < d[2]
         point = select(first, a[0], b[0]), select(first, a[1], b[1]), select(first, a[2], b[2])
-        cosine, sine = 1.0, 0.0
         if kind == WITH_BOX:
-            # All of it along the edges of the box.
-            cosine, sine = turns[j, 0], turns[j, 1]
-            c, d = turned_back(a, cosine, sine), turned_back(b, cosine, sine)
-            lower = (boxes[j, 0, 0], boxes[j, 0, 1], boxes[j, 0, 2])
-            upper = (boxes[j, 1, 0], boxes[j, 1, 1], boxes[j, 1, 2])
+            hx, hy, hz = poses[frame, 0], poses[frame, 1], poses[frame, 2]
+            lower, upper = (-hx, -hy, -hz), (hx, hy, hz)
             centre = excess_over_box(along(c, d, 0.5), lower, upper)
             apart = distance_from_box(centre) >= radius + reach
             if not any_lane(wanted & ~proven & ~apart):
                 continue
             point = along(a, b, deepest_share(c, d, lower, upper))
-        x, y, z = excess_over_box(turned_back(point, cosine, sine), lower, upper)
+        x, y, z = excess_over_box(to_frame(poses, frame, point), lower, upper)
         if not any_lane(wanted & ~proven & (distance_from_box((x, y, z)) < radius)):
             continue
         # The point's motion along each edge to first order: an arm that slides along an obstacle
@@ -313,8 +316,8 @@ def overlaps(
         remainder = 0.0 * half[0]
         for axis in range(min(n, bodies[i, 2])):
             width = share * half[axis]
-            speed = (jacobian[0, axis], jacobian[1, axis], jacobian[2, axis])
-            speed = turned_back(speed, cosine, sine)
+            u, v, w = jacobian[0, axis], jacobian[1, axis], jacobian[2, axis]
+            speed = rotated_back(poses, frame, u, v, w)
             x += width * abs(speed[0])
             y += width * abs(speed[1])
             z += width * abs(speed[2])

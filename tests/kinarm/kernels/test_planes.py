@@ -4,15 +4,16 @@ import numpy as np
 from configurations import pair_distances, random_configurations
 from numba import njit
 
-from kinarm.contact_shapes import GROUND, PLANE
-from kinarm.kernels.kinematics import POSE, forward_kinematics
+from kinarm.contact_shapes import PLANE, WITH_HALFSPACE
+from kinarm.kernels.kinematics import POSE, forward_kinematics, place_bodies
 from kinarm.kernels.planes import EVERYDAY, FINE, height_above, propose, separate
 
 
 @njit
 def heights(chain, shapes, configurations, proposed, separated, again, coarse):
     """Heights above planes as proposed; as bettered, told and anew; and so with coarse movers."""
-    poses = np.empty((configurations.shape[1] + 1, POSE))
+    poses = np.empty((configurations.shape[1] + 1 + len(shapes.placed), POSE))
+    place_bodies(shapes.placed, poses)
     plane, relative, simplex = np.empty((1, PLANE)), np.empty((1, POSE)), np.empty((4, 3))
     for i in range(len(configurations)):
         forward_kinematics(chain, configurations, i, poses)
@@ -20,7 +21,7 @@ def heights(chain, shapes, configurations, proposed, separated, again, coarse):
             propose(shapes, pair, poses, plane, 0)
             proposed[i, pair] = height_above(shapes, pair, EVERYDAY, poses, plane, 0)
             separated[i, pair] = height_above(shapes, pair, FINE, poses, plane, 0)
-            if shapes.planes[pair, 0] != GROUND:
+            if shapes.pairs[pair, 0] != WITH_HALFSPACE:
                 separated[i, pair] = separate(shapes, pair, poses, relative, simplex, plane)
             again[i, pair] = height_above(shapes, pair, FINE, poses, plane, 0)
             coarse[i, pair] = height_above(shapes, pair, EVERYDAY, poses, plane, 0)

@@ -16,7 +16,7 @@ from kinarm.kernels.proof import (
     prove_step,
     renew_planes,
 )
-from kinarm.kernels.session import put, work_space
+from kinarm.kernels.session import furnish, put, work_space
 
 
 @njit
@@ -46,7 +46,9 @@ def proofs(simulator, tested, starts, targets):
     """Bounds of the least height in steps, by old and by new planes; doubt, and what touches."""
     chain, shapes, _ = simulator.world.records
     n = simulator.arm.n_joints
-    space = work_space(n_joints=n, n_actuated=n, n_pairs=len(shapes.planes))
+    sizes = {"n_pairs": len(shapes.planes), "n_placed": len(shapes.placed)}
+    space = work_space(n_joints=n, n_actuated=n, **sizes)
+    furnish(shapes.values.placed, *space)
     bounds, found = np.zeros((2, len(starts))), np.zeros((2, len(starts)), dtype=np.int64)
     prove(chain, shapes, tested, starts, targets, *space, bounds, found)
     return bounds, found[0], found[1] > 0

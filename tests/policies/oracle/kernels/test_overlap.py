@@ -7,7 +7,7 @@ from configurations import contact_boundary, depths, random_configurations
 from hanging_chain import BASE, LENGTHS, RADIUS, SLAB, tips
 from numba import njit
 
-from kinarm.kernels.kinematics import POSE, forward_kinematics
+from kinarm.kernels.kinematics import POSE, forward_kinematics, place_bodies
 from kinarm.kernels.proof import DEPTH
 from kinarm.policies.oracle.kernels.box_proofs import overlaps
 from kinarm.scene import Obstacle
@@ -17,6 +17,7 @@ CAPSULE_ARMS = ("lrmate200ic_5l", "paper", "paper_flange")
 
 @njit
 def claims_of(chain, shapes, centres, halves, share, poses, jacobian, claimed):
+    place_bodies(shapes.placed, poses)
     for i in range(len(centres)):
         forward_kinematics(chain, centres, i, poses)
         claimed[i] = overlaps(True, chain, shapes, poses, halves[i], share, jacobian)
@@ -27,9 +28,10 @@ def claims(simulator, centres, halves=None, share=1.0):
     n = simulator.n_actions
     if halves is None:
         halves, share = np.ones((len(centres), n)), 0.0
-    poses, jacobian = np.empty((simulator.arm.n_joints + 1, POSE)), np.empty((3, n))
-    claimed = np.empty(len(centres), dtype=bool)
     shapes = simulator.world.contact_model.shapes
+    frames = simulator.arm.n_joints + 1 + len(shapes.placed)
+    poses, jacobian = np.empty((frames, POSE)), np.empty((3, n))
+    claimed = np.empty(len(centres), dtype=bool)
     claims_of(simulator.arm.chain, shapes, centres, halves, share, poses, jacobian, claimed)
     return claimed
 
@@ -126,12 +128,14 @@ class TestShapes:
         simulator = simulators["mesh"]
         configurations = random_configurations(simulator, 7, 20_000)
         assert simulator.world.contact_model.in_contact(configurations).mean() > 0.05
-        assert not simulator.world.contact_model.shapes.exact.any()
+        n_shapes = simulator.arm.geometry.ngeoms
+        assert not simulator.world.contact_model.shapes.exact[:n_shapes].any()
         assert not claims(simulator, configurations).any()
 
     def test_capsules_beside_other_shapes_do(self, simulators):
         simulator = simulators["sliding"]
-        assert simulator.world.contact_model.shapes.exact.sum() == 2
+        n_shapes = simulator.arm.geometry.ngeoms
+        assert simulator.world.contact_model.shapes.exact[:n_shapes].sum() == 2
         assert claims(simulator, random_configurations(simulator, 8, 20_000)).sum() > 20
 
 

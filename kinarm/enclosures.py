@@ -1,0 +1,118 @@
+"""Polytopes and capsules around shapes, none of which is too small."""
+
+from typing import Any, NamedTuple
+
+import coal
+import numpy as np
+import pinocchio as pin
+
+from kinarm._files import cached_arrays
+from kinarm.errors import ArmError
+from kinarm.kernels.compiling import Array
+from kinarm.kernels.distance import distances_from_hull
+
+ENCLOSURES = 1
+"""To be raised when the same points get another enclosure."""
+
+FEW, MANY = 16, 256
+"""Corners of a coarse and of a fine polytope about a mesh."""
+
+CLOSE_ENOUGH = 1e-4
+"""Widening below which no more corners are taken [m]."""
+
+SIDES = 32
+"""Sides of the prism about a cylinder."""
+
+
+class Enclosure(NamedTuple):
+    """Hull of corners, shape (n, 3), widened by a radius [m], in a joint's frame."""
+
+    corners: Array
+    rounding: float
+
+    def moved(self, placement: pin.SE3) -> "Enclosure":
+        """The same one elsewhere."""
+        corners = np.array([placement.act(each) for each in self.corners])
+        return Enclosure(corners, self.rounding)
+
+
+def enclosing_polytope(shape: pin.GeometryObject, most: int = MANY) -> Enclosure:
+    """Rounded polytope of at most so many corners around a shape, in the frame of its joint.
+
+    It equals a capsule, sphere or box. A mesh gets the hull of a few vertices, each the farthest
+    from the hull before, widened by the distance of the farthest left. Others raise ArmError.
+    """
+    corners, radius = core(shape)
+    local = Enclosure(corners, radius)
+    if isinstance(shape.geometry, coal.Cylinder):
+        local = around(prism(radius, float(corners[1, 2])), most)
+    elif isinstance(shape.geometry, coal.ConvexBase):
+        local = around(corners, most)
+    return local.moved(shape.placement)
+
+
+def core(shape: pin.GeometryObject) -> tuple[Array, float]:
+    """Corners, shape (n, 3), and radius whose widened hull is or encloses a shape."""
+    body = shape.geometry
+    if isinstance(body, coal.Sphere):
+        return np.zeros((1, 3)), float(body.radius)
+    if isinstance(body, coal.Capsule | coal.Cylinder):
+        half = np.array([0.0, 0.0, float(body.halfLength)])
+        return np.array([-half, half]), float(body.radius)
+    if isinstance(body, coal.Box):
+        return np.array(np.meshgrid(*[(-1, 1)] * 3)).reshape(3, -1).T * body.halfSide, 0.0
+    if isinstance(body, coal.ConvexBase):
+        return np.array(body.points()), 0.0
+    raise ArmError(f"collision shape {shape.name!r} is a {type(body).__name__}: not supported")
+
+
+def prism(radius: float, half_length: float) -> Array:
+    """Corners of a prism about a cylinder, shape (n, 3)."""
+    angles = np.arange(SIDES) * (2 * np.pi / SIDES)
+    ring = radius / np.cos(np.pi / SIDES) * np.stack([np.cos(angles), np.sin(angles)], axis=1)
+    ends = (np.full((SIDES, 1), end) for end in (-half_length, half_length))
+    return np.concatenate([np.concatenate([ring, end], axis=1) for end in ends])
+
+
+def around(points: Array, most: int) -> Enclosure:
+    """Enclose the hull of points, shape (n, 3), through the cache."""
+    made_of = np.int64(most).tobytes() + points.tobytes()
+    fitted = cached_arrays("enclosure", ENCLOSURES, made_of, lambda: _fitted(points, most))
+    return Enclosure(fitted["corners"], float(fitted["rounding"]))
+
+
+def _fitted(points: Array, most: int) -> dict[str, Any]:
+    """Corners and rounding that enclose the hull of points."""
+    middle = (points.min(axis=0) + points.max(axis=0)) / 2
+    chosen = [int(np.square(points - middle).sum(axis=1).argmax())]
+    distances = np.empty(len(points))
+    while True:
+        distances_from_hull(points[chosen], points, distances)
+        farthest = int(distances.argmax())
+        if distances[farthest] <= CLOSE_ENOUGH or len(chosen) == most:
+            rounding = float(distances[farthest]) * (1 + 1e-9) + 1e-9
+            return {"corners": points[chosen], "rounding": rounding}
+        chosen.append(farthest)
+
+
+def enclosing_capsule(shape: pin.GeometryObject) -> Enclosure:
+    """Capsule around a shape in its joint's frame; equal to a capsule or sphere."""
+    corners, radius = core(shape)
+    few = len(corners) <= 2
+    local = Enclosure(corners[[0, -1]], radius) if few else _capsule_around(corners)
+    return local.moved(shape.placement)
+
+
+def _capsule_around(points: Array) -> Enclosure:
+    """Capsule along the main direction of points, shape (n, 3)."""
+    centre = (points.min(axis=0) + points.max(axis=0)) / 2
+    _, _, directions = np.linalg.svd(points - centre, full_matrices=False)
+    direction = directions[0]
+    along = (points - centre) @ direction
+    across = np.linalg.norm(points - centre - along[:, None] * direction, axis=1)
+    radius = float(across.max()) * (1 + 1e-9)
+    cap = np.sqrt(np.maximum(radius**2 - across**2, 0.0))
+    low, high = float((along + cap).min()), float((along - cap).max())
+    if low > high:
+        low = high = (low + high) / 2
+    return Enclosure(np.array([centre + low * direction, centre + high * direction]), radius)

@@ -1,0 +1,29 @@
+"""Scenes of bodies of every shape."""
+
+import numpy as np
+
+from kinarm.bodies import SHAPES, Body
+from kinarm.scene import PAPER_GOALS, Scene
+
+
+def random_body(rng, name, shape, reach=0.8, largest=0.2):
+    """A body of a shape, somewhere about the base, turned anyhow."""
+    angle, distance, turn = rng.uniform(-3, 3), rng.uniform(0.35, reach), rng.normal(size=4)
+    position = distance * np.cos(angle), distance * np.sin(angle), rng.uniform(0, 1.5 * reach)
+    pose = {"position": position, "quaternion": turn / np.linalg.norm(turn)}
+    if shape == "halfspace":
+        # Below the base, or behind a wall that leans.
+        pose = {"position": (-0.9, 0.0, 0.0), "rpy": (0.2, rng.uniform(1.2, 1.6), 0.3)}
+    size = rng.uniform(0.03, largest, len(SHAPES[shape]))
+    vertices = rng.normal(size=(12, 3)) * largest / 2 if shape == "mesh" else ()
+    return Body(name=name, shape=shape, size=size, vertices=vertices, **pose)
+
+
+def random_scene(seed, count=8, shapes=tuple(SHAPES), ground=True, **settings):
+    """A scene of so many bodies, the shapes by turns, about the paper's goals."""
+    rng = np.random.default_rng(seed)
+    bodies = [
+        random_body(rng, f"{shapes[k % len(shapes)]} {k}", shapes[k % len(shapes)], **settings)
+        for k in range(count)
+    ]
+    return Scene(ground=ground, obstacles=bodies, goal_regions=PAPER_GOALS)
