@@ -17,6 +17,7 @@ import numpy as np
 from kinarm import PROBLEMS, REWARD_TERMS, Arm, RewardWeights, Scene, Simulator
 from kinarm.__main__ import COMMANDS
 from kinarm._fields import summary_of
+from kinarm.collision import link_of
 from kinarm.enclosures import enclosing_capsule
 from kinarm.envs import ENVIRONMENTS
 from kinarm.evaluation import METRICS
@@ -72,7 +73,7 @@ def capsule_table(name: str) -> str:
     for shape in Arm.load(name).geometry.geometryObjects:
         (start, end), radius = enclosing_capsule(shape)
         frame = f"joint {shape.parentJoint}" if shape.parentJoint else "world"
-        link = shape.name.rsplit("_", 1)[0].replace("_", " ")
+        link = link_of(shape).replace("_", " ")
         rows.append([link, frame, numbers(start), numbers(end), f"{radius:.3f}"])
     return markdown_table(["body", "frame", "from [m]", "to [m]", "radius [m]"], rows)
 

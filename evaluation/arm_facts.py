@@ -10,8 +10,9 @@ from numpy.typing import NDArray
 from kinarm.arm import Arm
 from kinarm.arm_specification import ArmFile
 from kinarm.clearance import SAMPLES, ContactStatistics, arm_warnings, contact_on_bare_ground
-from kinarm.collision import ContactModel
+from kinarm.collision import ContactModel, link_of
 from kinarm.evaluation.report.templating import template_environment
+from kinarm.evaluation.self_contact import SelfContact
 
 
 def joint_speeds(arm: Arm) -> str:
@@ -25,7 +26,7 @@ def untested_pairs(contact: ContactModel) -> Iterator[tuple[str, str, str]]:
     shapes = list(zip(contact.arm.geometry.geometryObjects, contact.body_names, strict=False))
     allowed = {frozenset(each.links): each.reason for each in contact.arm.allowed_contacts}
     for (first, one), (second, other) in combinations(shapes, 2):
-        links = frozenset(shape.name.rsplit("_", 1)[0] for shape in (first, second))
+        links = frozenset(map(link_of, (first, second)))
         if abs(first.parentJoint - second.parentJoint) == 1:
             yield one, other, "neighbours"
         elif first.parentJoint != second.parentJoint and links in allowed:
@@ -38,6 +39,7 @@ def arm_facts(arm: Arm) -> str:
     """All facts, as lines under headings."""
     contact, file = contact_on_bare_ground(arm), ArmFile.of(arm.specification.source)
     shapes = (_shape(each.geometry) for each in arm.geometry.geometryObjects)
+    inflated = SelfContact(contact).warning()
     environment = template_environment()
     environment.filters["span"] = _span
     text = environment.get_template("arm.txt").render(
@@ -46,7 +48,7 @@ def arm_facts(arm: Arm) -> str:
         shapes=zip(contact.body_names, shapes, strict=False),
         statistics=ContactStatistics.sample(contact),
         untested=untested_pairs(contact),
-        warnings=arm_warnings(contact),
+        warnings=[*arm_warnings(contact), *([inflated] if inflated else [])],
         samples=SAMPLES,
     )
     return text.rstrip()

@@ -1,6 +1,7 @@
 """Robot arms: a Pinocchio model with tool, limits and collision shapes."""
 
 import hashlib
+from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace
 from functools import cached_property
 from pathlib import Path
@@ -16,7 +17,7 @@ from kinarm._files import first_line
 from kinarm.arm_specification import AllowedContact, ArmSpecification
 from kinarm.chain import Chain, link_lengths, within_limits
 from kinarm.errors import ArmError, finite_array
-from kinarm.meshes import hull_of_mesh
+from kinarm.meshes import hulls_of_mesh
 from kinarm.urdf import Description, read_urdf
 
 DEFAULT_ARM = "paper"
@@ -33,8 +34,8 @@ class Arm:
     specification, description : ArmSpecification and Description
         What it was made of, and the URDF, reduced to the tool's chain.
     model, geometry : pinocchio.Model and pinocchio.GeometryModel
-        Kinematics, and collision shapes: primitives, or convex hulls of meshes;
-        no pairs.
+        Kinematics, and collision shapes: primitives, or convex hulls or pieces of
+        meshes; no pairs.
     n_actuated : int
         Joints, the first ones, that actions move; the others stay at `home`.
     home : ndarray, shape (n_joints,)
@@ -95,7 +96,7 @@ class Arm:
             specification=specification,
             description=description,
             model=model,
-            geometry=_build_shapes(description, model),
+            geometry=_build_shapes(description, model, wanted.pieces or {}),
             n_actuated=_n_actuated(wanted.actuated, model, chain, description),
             home=_home(wanted.home, chain, tuple(model.names[1:])),
             allowed_contacts=wanted.allowed_contacts or (),
@@ -143,6 +144,12 @@ class Arm:
                 part.placement = base * part.placement
         chain = Chain.from_model(model, self.tool_frame)
         return replace(self, model=model, geometry=geometry, chain=chain, unplaced=self)
+
+    @property
+    def meshes(self) -> pin.GeometryModel:
+        """Its collision shapes with meshes as they are, with the base at the origin."""
+        text = ElementTree.tostring(_robot(self.description), "unicode")
+        return pin.buildGeomFromUrdfString(self.model, text, pin.GeometryType.COLLISION)
 
     @property
     def n_joints(self) -> int:
@@ -239,18 +246,25 @@ def _robot(description: Description) -> ElementTree.Element:
     return robot
 
 
-def _build_shapes(description: Description, model: pin.Model) -> pin.GeometryModel:
-    """Load the collision shapes; meshes become convex hulls."""
-    robot, hulls = _robot(description), {}
+def _build_shapes(
+    description: Description, model: pin.Model, pieces: Mapping[str, int]
+) -> pin.GeometryModel:
+    """Load the collision shapes; meshes become convex hulls, or some links' pieces."""
+    robot, hulls = _robot(description), dict[str, coal.ConvexBase]()
     for link in robot.findall("link"):
-        for number, shape in enumerate(link.findall("collision/geometry")):
-            mesh = shape.find("mesh")
+        name, number = link.get("name", ""), 0
+        for collision in link.findall("collision"):
+            link.remove(collision)
+            mesh, found = collision.find("geometry/mesh"), list[coal.ConvexBase]()
             if mesh is not None:
-                scale = np.array([float(factor) for factor in mesh.get("scale", "").split()])
-                hull = hull_of_mesh(Path(mesh.get("filename", "")), scale)
-                hulls[f"{link.get('name')}_{number}"] = hull
-                shape.remove(mesh)
-                ElementTree.SubElement(shape, "sphere", radius="1")
+                scale = np.array([float(factor) for factor in mesh.attrib["scale"].split()])
+                found = hulls_of_mesh(Path(mesh.attrib["filename"]), scale, pieces.get(name, 1))
+                mesh.tag, mesh.attrib = "sphere", {"radius": "1"}
+            for hull in found or [None]:
+                link.append(collision)
+                if hull is not None:
+                    hulls[f"{name}_{number}"] = hull
+                number += 1
     text = ElementTree.tostring(robot, "unicode")
     geometry = pin.buildGeomFromUrdfString(model, text, pin.GeometryType.COLLISION)
     for shape in geometry.geometryObjects:

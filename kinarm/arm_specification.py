@@ -10,6 +10,9 @@ from kinarm.errors import POSITIVE, ArmError
 PACKAGE = "example-robot-data:"
 """Prefix of sources in the installed package of that name."""
 
+MOST_PIECES = 32
+"""Pieces of a mesh at most."""
+
 
 def arm_names() -> tuple[str, ...]:
     """Names of shipped arms, and of those whose package is known."""
@@ -67,6 +70,9 @@ class ArmSpecification(Checked):
         m].
     velocity_limits : tuple of float
         Limits to use instead of the URDF's [rad/s or m/s].
+    pieces : dict
+        How many convex pieces meshes are cut into, by link; elsewhere their
+        convex hulls count.
     allowed_contacts : tuple of AllowedContact
         Links that may touch.
     digest : str
@@ -82,6 +88,9 @@ class ArmSpecification(Checked):
     limits: dict[str, tuple[float, float]] | None = field(default=None, hash=False)
     home: tuple[float, ...] | None = None
     velocity_limits: tuple[float, ...] | None = field(default=None, metadata=POSITIVE)
+    pieces: dict[str, int] | None = field(
+        default=None, hash=False, metadata={"at_most": MOST_PIECES}
+    )
     allowed_contacts: tuple[AllowedContact, ...] | None = None
     digest: str | None = None
 
@@ -105,7 +114,7 @@ class ArmSpecification(Checked):
         given = {name: value for name, value in given.items() if value is not None}
         if not self.package_dirs:
             del given["package_dirs"]
-        for name in {"held", "limits"} & given.keys():
+        for name in {"held", "limits", "pieces"} & given.keys():
             given[name] = {**(getattr(below, name) or {}), **given[name]}
         return replace(below, **given)
 

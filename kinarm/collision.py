@@ -5,6 +5,7 @@ as flat arrays (`ContactShapes`), from which kernels prove most configurations.
 """
 
 import warnings
+from collections import Counter
 from collections.abc import Iterable
 from dataclasses import dataclass, fields
 from functools import cached_property
@@ -241,23 +242,22 @@ def _add_scene(geometry: pin.GeometryModel, scene: Scene) -> None:
         geometry.addGeometryObject(pin.GeometryObject(body.name, 0, placement, coal_shape(body)))
 
 
-def _links(arm: Arm) -> list[str]:
-    """Link of each collision shape."""
-    return [shape.name.rsplit("_", 1)[0] for shape in arm.geometry.geometryObjects]
+def link_of(shape: pin.GeometryObject) -> str:
+    """Link of a collision shape."""
+    return str(shape.name.rsplit("_", 1)[0])
 
 
 def body_names(arm: Arm) -> tuple[str, ...]:
     """Links of the collision shapes, numbered only where a link has several."""
-    names, links = [shape.name for shape in arm.geometry.geometryObjects], _links(arm)
-    return tuple(
-        link if links.count(link) == 1 else name for link, name in zip(links, names, strict=True)
-    )
+    shapes = list(arm.geometry.geometryObjects)
+    count = Counter(map(link_of, shapes))
+    return tuple(link_of(shape) if count[link_of(shape)] == 1 else shape.name for shape in shapes)
 
 
 def _candidate_pairs(arm: Arm, geometry: pin.GeometryModel, n_shapes: int) -> list[tuple[int, int]]:
     """All pairs that move against each other, but those that are allowed."""
     parent = [shape.parentJoint for shape in geometry.geometryObjects]
-    links = _links(arm)
+    links = [link_of(shape) for shape in arm.geometry.geometryObjects]
     allowed = {frozenset(contact.links) for contact in arm.allowed_contacts}
     pairs = []
     for first, second in combinations(range(n_shapes), 2):

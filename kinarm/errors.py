@@ -239,7 +239,7 @@ def check_range(name: str, value: Any, demands: Mapping[str, Any]) -> None:
     name : str
         Name of the field, for messages.
     value : object
-        Its value, or a tuple of such; anything but numbers passes.
+        Its value, or a tuple or table of such; anything but numbers passes.
     demands : mapping
         Metadata of the field. For whole numbers: ``at_least``, 1 by default,
         and ``at_most``. For others: a condition that ``holds``, and what they
@@ -248,6 +248,9 @@ def check_range(name: str, value: Any, demands: Mapping[str, Any]) -> None:
     if isinstance(value, tuple):
         for each in value:
             check_range(name, each, demands)
+    elif isinstance(value, Mapping):
+        for key, each in value.items():
+            check_range(f"{name}.{key}", each, demands)
     elif type(value) is int:
         whole_number(name, value, demands.get("at_least", 1), demands.get("at_most", math.inf))
     elif isinstance(value, float):

@@ -14,6 +14,7 @@ from scipy.spatial import HalfspaceIntersection
 from kinarm._files import Arrays, absolute, cached_arrays, first_line, is_file
 from kinarm.bodies import Body
 from kinarm.errors import ArmError, finite_array
+from kinarm.pieces import cut_into_pieces
 from kinarm.urdf_tree import FARTHEST, parse_xml
 
 FORMATS = (".dae", ".obj", ".stl")
@@ -32,8 +33,8 @@ NUMBERS = re.compile(r"\s*(?:[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?(?:\s+|$))
 FLAT = 1e-9
 """Thickness over width of what has no volume."""
 
-VERSION = 1
-"""To be raised when the same mesh gets another hull."""
+VERSION = 2
+"""To be raised when the same mesh gets other hulls."""
 
 MANY_VERTICES = 1000
 """Vertices above which a simpler hull takes its place."""
@@ -137,19 +138,51 @@ def check_vertices(path: Path, vertices: NDArray[np.float64]) -> None:
         raise ArmError(f"mesh {path.name!r} has no volume")
 
 
-def hull_of_mesh(path: Path, scale: NDArray[np.float64]) -> coal.ConvexBase:
-    """Convex hull of a mesh file's vertices, or a simpler polytope around many.
+def hulls_of_mesh(path: Path, scale: NDArray[np.float64], count: int = 1) -> list[coal.ConvexBase]:
+    """Convex hulls of a mesh file, or of the pieces that it is cut into.
 
-    Its corners are cached. ``scale``, shape (3,), holds factors along its axes.
+    A hull of many corners is replaced by a simpler polytope around it. Corners
+    are cached.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+    scale : ndarray, shape (3,)
+        Factors along its axes.
+    count : int
+        Pieces at most.
 
     Raises
     ------
     ArmError
         If the file is no readable mesh.
     """
-    content = scale.tobytes() + mesh_content(path)
-    corners = cached_arrays("hull", VERSION, content, lambda: _corners(path, scale))["corners"]
-    return convex_hull(corners)
+    content = bytes([count]) + scale.tobytes() + mesh_content(path)
+    arrays = cached_arrays("hull", VERSION, content, lambda: _corners(path, scale, count))
+    return [convex_hull(arrays[str(number)]) for number in range(len(arrays))]
+
+
+def _corners(path: Path, scale: NDArray[np.float64], count: int) -> Arrays:
+    """Corners of each hull, or of a polytope around it, by its number."""
+    try:
+        mesh = coal.MeshLoader(coal.BV_AABB).load(str(path), scale)
+        vertices = mesh.vertices()
+        check_vertices(path, vertices)
+        pieces = [vertices]
+        if count > 1:
+            faces = map(mesh.tri_indices, range(mesh.num_tris))
+            corners = np.array([[face[corner] for corner in range(3)] for face in faces])
+            pieces = cut_into_pieces(vertices[corners], count)
+        hulls = [np.array(convex_hull(piece).points()) for piece in pieces]
+        return {
+            str(number): enclosing_corners(hull) if len(hull) > MANY_VERTICES else hull
+            for number, hull in enumerate(hulls)
+        }
+    except (ValueError, RuntimeError) as error:
+        # Coal's reason comes after the place in its sources.
+        reason = str(error).rpartition("message: ")[2]
+        raise ArmError(f"mesh {path.name!r} cannot be loaded: {reason}") from error
 
 
 def convex_hull(points: NDArray[np.float64]) -> coal.ConvexBase:
@@ -181,7 +214,7 @@ def mesh_vertices(
         If the file is no readable mesh, or is not convex.
     """
     file, factors = Path(path), np.full(3, finite_array("scale", scale, ()))
-    shape = hull_of_mesh(file, factors)
+    (shape,) = hulls_of_mesh(file, factors)
     if not hull:
         solid = coal.MeshLoader(coal.BV_AABB).load(str(file), factors).computeVolume()
         excess = shape.computeVolume() / abs(solid) - 1 if solid else np.inf
@@ -201,20 +234,6 @@ def coal_shape(body: Body) -> coal.CollisionGeometry:
         return coal.Halfspace(np.array([0.0, 0.0, 1.0]), 0.0)
     kinds = {"box": coal.Box, "sphere": coal.Sphere, "capsule": coal.Capsule}
     return kinds.get(body.shape, coal.Cylinder)(*body.size)
-
-
-def _corners(path: Path, scale: NDArray[np.float64]) -> Arrays:
-    """Corners of a mesh's hull, or of a polytope around it."""
-    try:
-        mesh = coal.MeshLoader(coal.BV_AABB).load(str(path), scale)
-        check_vertices(path, mesh.vertices())
-        mesh.buildConvexHull(True, "Qt")
-        corners = np.array(mesh.convex.points())
-        return {"corners": enclosing_corners(corners) if len(corners) > MANY_VERTICES else corners}
-    except (ValueError, RuntimeError) as error:
-        # Coal's reason comes after the place in its sources.
-        reason = str(error).rpartition("message: ")[2]
-        raise ArmError(f"mesh {path.name!r} cannot be loaded: {reason}") from error
 
 
 def enclosing_corners(points: NDArray[np.float64]) -> NDArray[np.float64]:

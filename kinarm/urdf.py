@@ -108,6 +108,7 @@ def _reduced(path: Path, specification: ArmSpecification) -> Description:
         ("joint in held", asked, moving),
         ("joint in limits", limits, moving),
         ("joint in actuated", specification.actuated or (), kept),
+        ("link in pieces", specification.pieces or {}, links),
         ("link in allowed_contacts", contacts, links),
     ):
         for name in named:

@@ -23,7 +23,7 @@ from kinarm.arm import Arm
 from kinarm.errors import KinarmError
 from kinarm.evaluation import EvaluationDocument, Study, oracle_bounds
 from kinarm.evaluation.finding import find_contestants
-from kinarm.meshes import hull_of_mesh
+from kinarm.meshes import hulls_of_mesh
 from kinarm.policies import Demonstrations, Policy, load_checkpoint, recipe
 from kinarm.policies.conversion.models import sb3_model
 from kinarm.policies.conversion.statistics import load_vec_normalize
@@ -202,7 +202,7 @@ LOADERS: dict[str, Loader] = {
         needs="stable_baselines3",
     ),
 }
-for _use, _read in (("hull", hull_of_mesh), ("looks", read_mesh_file)):
+for _use, _read in (("hull", hulls_of_mesh), ("looks", read_mesh_file)):
     for _kind, _sample, _damage in (
         ("stl", partial(samples.stl, True), damaged_bytes),
         ("text stl", partial(samples.stl, False), damaged_text),

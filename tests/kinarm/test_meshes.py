@@ -13,7 +13,7 @@ from kinarm.meshes import (
     MANY_VERTICES,
     PLANES,
     enclosing_corners,
-    hull_of_mesh,
+    hulls_of_mesh,
     mesh_content,
 )
 
@@ -83,7 +83,7 @@ def write_ball(path, count):
 def test_of_a_mesh_encloses_its_vertices(tmp_path, count):
     points = write_ball(tmp_path / "ball.obj", count)
     scale = np.array([1.0, 2.0, 0.5])
-    hull = hull_of_mesh(tmp_path / "ball.obj", scale)
+    (hull,) = hulls_of_mesh(tmp_path / "ball.obj", scale)
     corners = np.array(hull.points())
     assert outside(points * scale, corners) < 1e-7  # Coal reads meshes in single precision
     assert outside(corners, points * scale) < 0.02
@@ -92,12 +92,12 @@ def test_of_a_mesh_encloses_its_vertices(tmp_path, count):
 
 def test_is_looked_up_the_second_time(tmp_path, monkeypatch):
     write_ball(tmp_path / "ball.obj", 100)
-    first = hull_of_mesh(tmp_path / "ball.obj", np.ones(3))
+    (first,) = hulls_of_mesh(tmp_path / "ball.obj", np.ones(3))
     monkeypatch.setattr(meshes, "_corners", None)
-    second = hull_of_mesh(tmp_path / "ball.obj", np.ones(3))
+    (second,) = hulls_of_mesh(tmp_path / "ball.obj", np.ones(3))
     np.testing.assert_array_equal(first.points(), second.points())
     with pytest.raises(TypeError):
-        hull_of_mesh(tmp_path / "ball.obj", np.full(3, 2.0))
+        hulls_of_mesh(tmp_path / "ball.obj", np.full(3, 2.0))
 
 
 @pytest.mark.parametrize("name", ["part.stl", "part.obj", "part.xyz"])
@@ -106,14 +106,14 @@ def test_what_is_no_mesh_is_refused(tmp_path, name):
     with pytest.raises(
         ArmError, match=f"mesh '?{name}'? (cannot be loaded|must be a file of)"
     ) as caught:
-        hull_of_mesh(tmp_path / name, np.ones(3))
+        hulls_of_mesh(tmp_path / name, np.ones(3))
     assert "\n" not in str(caught.value)
 
 
 def test_the_reason_of_a_refused_mesh_is_told(tmp_path):
     (tmp_path / "empty.stl").write_bytes(bytes(84))
     with pytest.raises(ArmError, match=r"'empty.stl' cannot be loaded: .*no facets defined"):
-        hull_of_mesh(tmp_path / "empty.stl", np.ones(3))
+        hulls_of_mesh(tmp_path / "empty.stl", np.ones(3))
 
 
 @pytest.mark.parametrize(("number", "reason"), [("nan", "away"), ("1e30", "away"), ("0", "volume")])
@@ -123,7 +123,7 @@ def test_meshes_that_are_refused(tmp_path, number, reason):
     path = tmp_path / "part.obj"
     path.write_text("".join("v {} {} {}\n".format(*corner) for corner in corners) + faces)
     with pytest.raises(ArmError, match=f"'part.obj'.*{reason}"):
-        hull_of_mesh(path, np.ones(3))
+        hulls_of_mesh(path, np.ones(3))
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,56 @@
+"""How often arms touch themselves at random, with hulls, with pieces, and with their meshes.
+
+``python -m docs.measurements.self_contact`` prints it for the named arms that have meshes.
+"""
+
+import sys
+
+import coal
+
+from kinarm import Arm, arm_names
+from kinarm.clearance import contact_on_bare_ground
+from kinarm.evaluation.report.templating import markdown_table
+from kinarm.evaluation.self_contact import SelfContact
+
+CONFIGURATIONS = 20_000
+
+PIECES = {
+    "ur3": {"upper_arm_link": 3, "forearm_link": 3},
+    "ur5": {"base_link": 2, "upper_arm_link": 4, "forearm_link": 3},
+    "ur10": {"upper_arm_link": 3, "forearm_link": 3},
+}
+"""Pieces that meshes are cut into, where hulls touch much more often."""
+
+
+def row(name: str) -> list[str]:
+    """Shares of an arm; a cell more tells how often pieces miss what meshes touch."""
+    pieces = PIECES.get(name, {})
+    hulls, cut = (
+        SelfContact(contact_on_bare_ground(Arm.load(name, pieces=each)), CONFIGURATIONS)
+        for each in ({}, pieces)
+    )
+    missed = (cut.meshes & ~cut.simulated).sum()
+    shares = [hulls.simulated.mean(), cut.meshes.mean(), cut.simulated.mean()]
+    listed = ", ".join(f"{link} = {count}" for link, count in pieces.items())
+    return [
+        f"`{name}`",
+        *(f"{share:.1%}" for share in shares),
+        str(missed),
+        listed and f"`{listed}`",
+    ]
+
+
+def main() -> None:
+    """Print a row for each arm."""
+    rows = []
+    for name in arm_names():
+        shapes = Arm.load(name).meshes.geometryObjects
+        if any(isinstance(shape.geometry, coal.BVHModelBase) for shape in shapes):
+            sys.stderr.write(f"{name}\n")
+            rows.append(row(name))
+    header = ("arm", "hulls", "meshes", "as cut", "missed", "pieces")
+    print(markdown_table(header, rows))
+
+
+if __name__ == "__main__":
+    main()
