@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from kinarm.arm import Arm
 from kinarm.arm_specification import ArmFile
 from kinarm.clearance import SAMPLES, ContactStatistics, arm_warnings, contact_on_bare_ground
-from kinarm.collision import ContactModel, link_of
+from kinarm.collision import ContactModel, are_neighbours, link_of
 from kinarm.evaluation.report.templating import template_environment
 from kinarm.evaluation.self_contact import SelfContact
 
@@ -27,7 +27,7 @@ def untested_pairs(contact: ContactModel) -> Iterator[tuple[str, str, str]]:
     allowed = {frozenset(each.links): each.reason for each in contact.arm.allowed_contacts}
     for (first, one), (second, other) in combinations(shapes, 2):
         links = frozenset(map(link_of, (first, second)))
-        if abs(first.parentJoint - second.parentJoint) == 1:
+        if are_neighbours(contact.arm, first, second):
             yield one, other, "neighbours"
         elif first.parentJoint != second.parentJoint and links in allowed:
             yield one, other, f"allowed: {allowed[links]}"

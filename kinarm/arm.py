@@ -1,7 +1,7 @@
 """Robot arms: a Pinocchio model with tool, limits and collision shapes."""
 
 import hashlib
-from collections.abc import Mapping
+from collections.abc import Iterable
 from dataclasses import dataclass, fields, replace
 from functools import cached_property
 from pathlib import Path
@@ -15,9 +15,10 @@ from numpy.typing import ArrayLike, NDArray
 
 from kinarm._files import first_line
 from kinarm.arm_specification import AllowedContact, ArmSpecification
+from kinarm.bodies import HeldBody
 from kinarm.chain import Chain, link_lengths, within_limits
 from kinarm.errors import ArmError, finite_array
-from kinarm.meshes import hulls_of_mesh
+from kinarm.meshes import coal_shape, hulls_of_mesh
 from kinarm.urdf import Description, read_urdf
 
 DEFAULT_ARM = "paper"
@@ -40,8 +41,10 @@ class Arm:
         Joints, the first ones, that actions move; the others stay at `home`.
     home : ndarray, shape (n_joints,)
         Reference configuration [rad or m].
+    held_bodies : tuple of HeldBody
+        What links hold; the last ones of the collision shapes.
     allowed_contacts : tuple of AllowedContact
-        Links that may touch.
+        Links or held bodies that may touch.
     chain : Chain
         The kinematics as flat arrays, for the compiled simulator.
     unplaced : Arm or None
@@ -54,6 +57,7 @@ class Arm:
     geometry: pin.GeometryModel
     n_actuated: int
     home: NDArray[np.float64]
+    held_bodies: tuple[HeldBody, ...]
     allowed_contacts: tuple[AllowedContact, ...]
     chain: Chain
     unplaced: "Arm | None" = None
@@ -96,9 +100,10 @@ class Arm:
             specification=specification,
             description=description,
             model=model,
-            geometry=_build_shapes(description, model, wanted.pieces or {}),
+            geometry=_build_shapes(description, model, wanted),
             n_actuated=_n_actuated(wanted.actuated, model, chain, description),
             home=_home(wanted.home, chain, tuple(model.names[1:])),
+            held_bodies=wanted.held_bodies or (),
             allowed_contacts=wanted.allowed_contacts or (),
             chain=chain,
         )
@@ -147,9 +152,8 @@ class Arm:
 
     @property
     def meshes(self) -> pin.GeometryModel:
-        """Its collision shapes with meshes as they are, with the base at the origin."""
-        text = ElementTree.tostring(_robot(self.description), "unicode")
-        return pin.buildGeomFromUrdfString(self.model, text, pin.GeometryType.COLLISION)
+        """Its collision shapes with meshes as they are."""
+        return _geometry(_robot(self.description), self.model, self.held_bodies)
 
     @property
     def n_joints(self) -> int:
@@ -246,11 +250,25 @@ def _robot(description: Description) -> ElementTree.Element:
     return robot
 
 
+def _geometry(
+    robot: ElementTree.Element, model: pin.Model, held_bodies: Iterable[HeldBody]
+) -> pin.GeometryModel:
+    """Collision shapes of a URDF, and what its links hold."""
+    text = ElementTree.tostring(robot, "unicode")
+    geometry = pin.buildGeomFromUrdfString(model, text, pin.GeometryType.COLLISION)
+    for body in held_bodies:
+        link = model.frames[model.getFrameId(body.link, pin.BODY)]
+        placement = link.placement * pin.SE3(body.rotation, np.array(body.position))
+        shape = (f"{body.name}_0", link.parentJoint, placement, coal_shape(body))
+        geometry.addGeometryObject(pin.GeometryObject(*shape))
+    return geometry
+
+
 def _build_shapes(
-    description: Description, model: pin.Model, pieces: Mapping[str, int]
+    description: Description, model: pin.Model, wanted: ArmSpecification
 ) -> pin.GeometryModel:
     """Load the collision shapes; meshes become convex hulls, or some links' pieces."""
-    robot, hulls = _robot(description), dict[str, coal.ConvexBase]()
+    robot, hulls, pieces = _robot(description), dict[str, coal.ConvexBase](), wanted.pieces or {}
     for link in robot.findall("link"):
         name, number = link.get("name", ""), 0
         for collision in link.findall("collision"):
@@ -265,8 +283,7 @@ def _build_shapes(
                 if hull is not None:
                     hulls[f"{name}_{number}"] = hull
                 number += 1
-    text = ElementTree.tostring(robot, "unicode")
-    geometry = pin.buildGeomFromUrdfString(model, text, pin.GeometryType.COLLISION)
+    geometry = _geometry(robot, model, wanted.held_bodies or ())
     for shape in geometry.geometryObjects:
         if shape.name in hulls:
             shape.geometry = hulls[shape.name]

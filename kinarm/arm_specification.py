@@ -5,6 +5,7 @@ from pathlib import Path
 
 from kinarm._fields import Checked, from_plain, init_fields, read_toml
 from kinarm._files import absolute, is_file, shipped_files
+from kinarm.bodies import HeldBody, read_meshes
 from kinarm.errors import POSITIVE, ArmError
 
 PACKAGE = "example-robot-data:"
@@ -21,7 +22,7 @@ def arm_names() -> tuple[str, ...]:
 
 @dataclass(frozen=True, kw_only=True)
 class AllowedContact(Checked):
-    """Two links whose contact counts for nothing.
+    """Two links or held bodies whose contact counts for nothing.
 
     Parameters
     ----------
@@ -73,8 +74,10 @@ class ArmSpecification(Checked):
     pieces : dict
         How many convex pieces meshes are cut into, by link; elsewhere their
         convex hulls count.
+    held_bodies : tuple of HeldBody
+        What links hold, such as a pen in the gripper.
     allowed_contacts : tuple of AllowedContact
-        Links that may touch.
+        Links or held bodies that may touch.
     digest : str
         Hash that the arm must have; see `Arm.digest`.
     """
@@ -91,6 +94,7 @@ class ArmSpecification(Checked):
     pieces: dict[str, int] | None = field(
         default=None, hash=False, metadata={"at_most": MOST_PIECES}
     )
+    held_bodies: tuple[HeldBody, ...] | None = None
     allowed_contacts: tuple[AllowedContact, ...] | None = None
     digest: str | None = None
 
@@ -168,7 +172,9 @@ class ArmFile(Checked):
     @classmethod
     def _read(cls, path: Path) -> "ArmFile":
         """Read an arm file."""
-        file = from_plain(cls, read_toml(path, "arm"), str(path))
+        entries = read_toml(path, "arm")
+        read_meshes(entries.get("arm"), "held_bodies", path)
+        file = from_plain(cls, entries, str(path))
         if file.arm.source.endswith(".toml"):
             raise ArmError(f"{path}: 'arm.source' must be a URDF or a known arm, no arm file")
         return replace(file, arm=file.arm.resolved(path.parent))

@@ -4,14 +4,17 @@ What cannot be is a `ProblemError`.
 """
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Literal
+from pathlib import Path
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from kinarm._fields import OPTIONAL, Checked
-from kinarm.errors import ProblemError
+from kinarm._files import absolute
+from kinarm.errors import InvalidInputError, KinarmError, ProblemError
 
 Point = tuple[float, float, float]
 
@@ -176,3 +179,45 @@ class Body(Checked):
         if self.shape == "cylinder":
             return np.asarray((np.hypot(x, y) <= radius + margin) & (beyond <= margin))
         return np.asarray(np.hypot(np.hypot(x, y), np.fmax(beyond, 0.0)) <= radius + margin)
+
+
+@dataclass(frozen=True, kw_only=True)
+class HeldBody(Body):
+    """A body that a link of the arm holds: its pose is in the link's frame.
+
+    Parameters
+    ----------
+    link : str
+        The link.
+    """
+
+    link: str
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.shape == "halfspace":
+            raise ProblemError(f"{self._told} has no end: link {self.link!r} cannot hold it")
+
+
+def read_meshes(table: Any, name: str, path: Path) -> None:
+    """Put vertices in the place of mesh files, in a list of bodies of a file's table.
+
+    Parameters
+    ----------
+    table, name
+        The table, and the entry with the list.
+    path : Path
+        The file, from whose folder meshes are named.
+    """
+    bodies = table.get(name) if isinstance(table, Mapping) else None
+    for number, entry in enumerate(bodies if isinstance(bodies, list) else ()):
+        if isinstance(entry, dict) and isinstance(entry.get("mesh"), str):
+            from kinarm.meshes import mesh_vertices
+
+            given = {key: entry.pop(key) for key in ("mesh", "scale", "hull") if key in entry}
+            try:
+                file = absolute(path).parent / given.pop("mesh")
+                entry["vertices"] = mesh_vertices(file, **given).tolist()
+            except KinarmError as error:
+                raise InvalidInputError(f"{path}: {name}[{number}]: {error}") from error
+            entry.setdefault("shape", "mesh")

@@ -254,18 +254,25 @@ def body_names(arm: Arm) -> tuple[str, ...]:
     return tuple(link_of(shape) if count[link_of(shape)] == 1 else shape.name for shape in shapes)
 
 
+def are_neighbours(arm: Arm, first: pin.GeometryObject, second: pin.GeometryObject) -> bool:
+    """Whether a joint joins the links of two shapes; held bodies have no neighbours."""
+    held = {body.name for body in arm.held_bodies}
+    apart = abs(first.parentJoint - second.parentJoint)
+    return apart == 1 and not held & {link_of(first), link_of(second)}
+
+
 def _candidate_pairs(arm: Arm, geometry: pin.GeometryModel, n_shapes: int) -> list[tuple[int, int]]:
     """All pairs that move against each other, but those that are allowed."""
-    parent = [shape.parentJoint for shape in geometry.geometryObjects]
-    links = [link_of(shape) for shape in arm.geometry.geometryObjects]
+    shapes = list(geometry.geometryObjects)
+    parent, links = [shape.parentJoint for shape in shapes], list(map(link_of, shapes))
     allowed = {frozenset(contact.links) for contact in arm.allowed_contacts}
     pairs = []
     for first, second in combinations(range(n_shapes), 2):
-        apart = abs(parent[first] - parent[second]) > 1
-        if apart and frozenset((links[first], links[second])) not in allowed:
+        alike = parent[first] == parent[second] or {links[first], links[second]} in allowed
+        if not alike and not are_neighbours(arm, shapes[first], shapes[second]):
             pairs.append((first, second) if parent[first] < parent[second] else (second, first))
     moving = [shape for shape in range(n_shapes) if parent[shape] > 0]
-    flat = [isinstance(each.geometry, coal.Halfspace) for each in geometry.geometryObjects]
+    flat = [isinstance(each.geometry, coal.Halfspace) for each in shapes]
     with_world = product(moving, range(n_shapes, geometry.ngeoms))
     # Kind after kind, which the kernels find easier to predict.
     return pairs + sorted(with_world, key=lambda pair: flat[pair[1]])

@@ -4,6 +4,7 @@ import itertools
 import re
 from collections.abc import Collection
 from pathlib import Path
+from typing import TYPE_CHECKING
 from xml.etree import ElementTree
 
 import coal
@@ -12,10 +13,12 @@ from numpy.typing import NDArray
 from scipy.spatial import HalfspaceIntersection
 
 from kinarm._files import Arrays, absolute, cached_arrays, first_line, is_file
-from kinarm.bodies import Body
 from kinarm.errors import ArmError, finite_array
 from kinarm.pieces import cut_into_pieces
 from kinarm.urdf_tree import FARTHEST, parse_xml
+
+if TYPE_CHECKING:
+    from kinarm.bodies import Body
 
 FORMATS = (".dae", ".obj", ".stl")
 """Endings of readable files."""
@@ -226,7 +229,7 @@ def mesh_vertices(
     return np.array(shape.points())
 
 
-def coal_shape(body: Body) -> coal.CollisionGeometry:
+def coal_shape(body: "Body") -> coal.CollisionGeometry:
     """A body's shape in Coal."""
     if body.shape == "mesh":
         return convex_hull(np.array(body.vertices))

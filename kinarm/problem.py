@@ -17,7 +17,8 @@ import tomli_w
 from kinarm._fields import Checked, from_plain, init_fields, read_toml, take_base, to_plain
 from kinarm._files import absolute, is_file, named_file, shipped_files, write_text
 from kinarm.arm_specification import ArmSpecification
-from kinarm.errors import InvalidInputError, KinarmError, ProblemError, UnknownNameError
+from kinarm.bodies import read_meshes
+from kinarm.errors import InvalidInputError, ProblemError, UnknownNameError
 from kinarm.scene import Scene
 from kinarm.task import ReachTask, RewardWeights, Stepping
 
@@ -280,7 +281,8 @@ def read_problem(path: Path) -> dict[str, Any]:
     if isinstance(scene, str):
         entries["scene"] = to_plain(find_scene(_beside(path, scene)))
     else:
-        _read_meshes(scene, path)
+        read_meshes(scene, "obstacles", path)
+    read_meshes(entries.get("arm"), "held_bodies", path)
     if isinstance(task, str):
         entries["task"] = to_plain(find_task(_beside(path, task)))
     elif isinstance(task, Mapping):
@@ -319,24 +321,8 @@ def _find_part(kind: type[Part], what: str, name: str | Path) -> Part:
         if "goal_regions" not in entries:
             raise InvalidInputError(f"{path}: 'goal_regions' is missing: where goals may lie")
         entries = {"obstacles": [], **entries}
-        _read_meshes(entries, path)
+        read_meshes(entries, "obstacles", path)
     return from_plain(kind, entries, str(path))
-
-
-def _read_meshes(scene: Any, path: Path) -> None:
-    """Put vertices in the place of mesh files, named from the folder of a scene's file."""
-    obstacles = scene.get("obstacles") if isinstance(scene, Mapping) else None
-    for number, entry in enumerate(obstacles if isinstance(obstacles, list) else ()):
-        if isinstance(entry, dict) and isinstance(entry.get("mesh"), str):
-            from kinarm.meshes import mesh_vertices
-
-            given = {name: entry.pop(name) for name in ("mesh", "scale", "hull") if name in entry}
-            try:
-                file = absolute(path).parent / given.pop("mesh")
-                entry["vertices"] = mesh_vertices(file, **given).tolist()
-            except KinarmError as error:
-                raise InvalidInputError(f"{path}: obstacles[{number}]: {error}") from error
-            entry.setdefault("shape", "mesh")
 
 
 def _beside(path: Path, name: str) -> str | Path:

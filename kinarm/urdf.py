@@ -104,16 +104,22 @@ def _reduced(path: Path, specification: ArmSpecification) -> Description:
     moving = [joint.name for joint in joints.values() if joint.kind in MOVING]
     kept = [joint.name for joint in chain_to(tool, joints) if joint.name not in asked]
     contacts = [link for each in specification.allowed_contacts or () for link in each.links]
+    bodies = specification.held_bodies or ()
+    named_parts = [*links, *(body.name for body in bodies)]
     for what, named, known in (
         ("joint in held", asked, moving),
         ("joint in limits", limits, moving),
         ("joint in actuated", specification.actuated or (), kept),
         ("link in pieces", specification.pieces or {}, links),
-        ("link in allowed_contacts", contacts, links),
+        ("link in held_bodies", [body.link for body in bodies], links),
+        ("link in allowed_contacts", contacts, named_parts),
     ):
         for name in named:
             if name not in known:
                 raise UnknownNameError(f"{what} of {path.name}:", name, known)
+    for body in bodies:
+        if named_parts.count(body.name) > 1:
+            raise ArmError(f"held body {body.name!r} needs a name of its own")
     _check_mimics([joints[name] for name in kept])
     for name in kept:
         notes += _bounded(joints[name], limits)

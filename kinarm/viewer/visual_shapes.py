@@ -79,13 +79,15 @@ class PaintedMesh(NamedTuple):
 
 @lru_cache(maxsize=8)
 def arm_parts(arm: Arm) -> tuple[ArmPart, ...]:
-    """All parts of an arm.
+    """All parts of an arm, and what it holds.
 
     It looks industrial with the geometry of the shipped ones. Any other arm shows the visual shapes
     of its URDF, or its collision shapes where none can be read, which is logged.
     """
+    n_held = len(arm.held_bodies)
+    held = collision_parts(arm)[-n_held:] if n_held else ()
     if looks_industrial(arm):
-        return tuple(industrial_parts(arm))
+        return (*industrial_parts(arm), *held)
     try:
         found = tuple(visual_parts(arm))
     except KinarmError as error:
@@ -94,7 +96,8 @@ def arm_parts(arm: Arm) -> tuple[ArmPart, ...]:
         )
         found = ()
     tool = from_coal(coal.Sphere(TOOL_RADIUS * min(arm.reach, 1.0))).moved(arm.chain.tool)
-    return (*(found or collision_parts(arm)), ArmPart(arm.n_joints, FINISHES["accent"], tool))
+    parts = (*found, *held) if found else collision_parts(arm)
+    return (*parts, ArmPart(arm.n_joints, FINISHES["accent"], tool))
 
 
 def looks_industrial(arm: Arm) -> bool:
