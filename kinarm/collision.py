@@ -23,7 +23,7 @@ from kinarm.errors import ProblemError
 from kinarm.meshes import coal_shape
 from kinarm.scene import Scene
 
-CLOSE, OFTEN, CLOSENESS_SAMPLES = 0.025, 0.05, 200
+CLOSE, OFTEN, CLOSENESS_SAMPLES = 0.025, 0.1, 200
 """Close pairs are nearer than this [m] in more than this share of these samples."""
 
 GUESS, HINT = np.array([1.0, 0.0, 0.0]), np.zeros(2, dtype=np.int32)

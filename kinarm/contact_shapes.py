@@ -15,10 +15,12 @@ from kinarm.chain import Chain, point_speed
 from kinarm.enclosures import (
     FEW,
     MANY,
+    SOME,
     Enclosure,
     around,
     enclosing_capsule,
     enclosing_polytope,
+    inner_capsule,
     prism,
 )
 from kinarm.kernels.compiling import Array
@@ -38,9 +40,9 @@ class ContactShapes(NamedTuple):
     """Shapes, pairs and motion bounds as flat arrays.
 
     A *body* is a rounded polytope: about each shape of the arm, then of the
-    scene; last come finer ones about shapes whose first one is coarse. Each lies
-    in a frame, of which there is a row in ``poses``: frame 0 is the world, k the
-    k-th joint, and further ones are those of the scene's bodies. Such a row
+    scene; last come closer and fine ones about shapes whose first is coarse. Each
+    lies in a frame, of which there is a row in ``poses``: frame 0 is the world, k
+    the k-th joint, and further ones are those of the scene's bodies. Such a row
     (`placed`) has a size and a rounding instead of a quaternion: the body's
     corners are multiplied by that size.
 
@@ -49,6 +51,9 @@ class ContactShapes(NamedTuple):
     capsules : ndarray, shape (n_shapes, 7)
         Capsule that is or encloses a shape: end points (3 + 3) in its frame,
         radius [m]. For the scene's bodies, before the size.
+    inner : ndarray, shape (n_shapes, 7)
+        Capsule that is or lies in a shape. For the scene's bodies the same axis,
+        and a radius of minus infinity where nothing in them is known.
     pairs : ndarray of int, shape (n_pairs, 3)
         Kind, index of a moving shape of the arm, and index of the other shape.
     travel : ndarray, shape (n_actuated, n_pairs)
@@ -78,6 +83,7 @@ class ContactShapes(NamedTuple):
     """
 
     capsules: Array
+    inner: Array
     pairs: NDArray[np.int64]
     travel: Array
     exact: NDArray[np.bool_]
@@ -110,11 +116,11 @@ class ContactShapes(NamedTuple):
         n_shapes : int
             The arm's shapes.
         close : collection of int
-            Pairs that mostly are too close for coarse polytopes.
+            Pairs that often are too close for coarse polytopes.
         """
         objects = list(arm.geometry.geometryObjects)
         surroundings = [unit_body(body) for body in scene.bodies]
-        bodies, links, finer = _enclosed(objects, surroundings, arm.n_joints)
+        bodies, links, (closer, finer) = _enclosed(objects, surroundings, arm.n_joints)
         ends = np.cumsum([0, *(len(body.corners) for body in bodies)])
         rows, planes, proxies = [], [], []
         travel = np.zeros((arm.n_actuated, len(pairs)))
@@ -128,7 +134,8 @@ class ContactShapes(NamedTuple):
                 base = 1
             last = min(links[mover], arm.n_actuated)
             fine = finer[carrier], finer[mover]
-            proxies.append((fine if column in close else (carrier, mover), fine))
+            usual = (closer[carrier], closer[mover]) if column in close else (carrier, mover)
+            proxies.append((usual, fine))
             planes.append((carrier, mover, base, last, frame))
             for axis in range(base, last):
                 # The fine polytope has all corners of the coarse one.
@@ -136,10 +143,13 @@ class ContactShapes(NamedTuple):
                 travel[axis, column] = point_speed(arm.chain, axis, links[mover], corners)
         capsules = [np.append(*enclosing_capsule(each)) for each in objects]
         capsules += [np.array(AXIS)] * len(surroundings)
+        inner = [np.append(*inner_capsule(each)) for each in objects]
+        inner += [np.append(AXIS[:6], 0.0 if each.exact else -np.inf) for each in surroundings]
         exact = [isinstance(each.geometry, EXACT) for each in objects]
         exact += [each.exact for each in surroundings]
         return cls(
             capsules=np.array(capsules, dtype=np.float64).reshape(-1, 7),
+            inner=np.array(inner, dtype=np.float64).reshape(-1, 7),
             pairs=np.array(rows, dtype=np.int64).reshape(-1, 3),
             travel=travel,
             exact=np.array(exact, dtype=bool),
@@ -212,19 +222,22 @@ def placed_row(body: Body, unit: UnitBody) -> Array:
 
 def _enclosed(
     objects: list[pin.GeometryObject], surroundings: list[UnitBody], n_joints: int
-) -> tuple[list[Enclosure], list[int], list[int]]:
-    """Bodies of shapes of arm and scene, their frames, and their finer bodies."""
+) -> tuple[list[Enclosure], list[int], list[list[int]]]:
+    """Bodies of shapes of arm and scene, their frames, and which bodies are closer, and fine."""
     bodies = [enclosing_polytope(shape, FEW) for shape in objects]
     bodies += [Enclosure(each.corners, 0.0) for each in surroundings]
     links = [shape.parentJoint for shape in objects]
     links += range(n_joints + 1, n_joints + 1 + len(surroundings))
-    finer = list(range(len(bodies)))
-    for index, shape in enumerate(objects):
-        if len(bodies[index].corners) == FEW:
-            finer[index] = len(bodies)
-            bodies.append(enclosing_polytope(shape, MANY))
-            links.append(links[index])
-    return bodies, links, finer
+    levels = []
+    for most in (SOME, MANY):
+        level = list(range(len(objects) + len(surroundings)))
+        for index, shape in enumerate(objects):
+            if len(bodies[index].corners) == FEW:
+                level[index] = len(bodies)
+                bodies.append(enclosing_polytope(shape, most))
+                links.append(links[index])
+        levels.append(level)
+    return bodies, links, levels
 
 
 def _keeps_height(chain: Chain, body: Body) -> bool:

@@ -1,4 +1,4 @@
-"""Polytopes and capsules around shapes, none of which is too small."""
+"""Polytopes and capsules around shapes, none of which is too small, and capsules in them."""
 
 from typing import Any, NamedTuple
 
@@ -14,11 +14,14 @@ from kinarm.kernels.distance import distances_from_hull
 ENCLOSURES = 1
 """To be raised when the same points get another enclosure."""
 
-FEW, MANY = 16, 256
-"""Corners of a coarse and of a fine polytope about a mesh."""
+FEW, SOME, MANY = 16, 64, 256
+"""Corners of a coarse, a closer and a fine polytope about a mesh."""
 
 CLOSE_ENOUGH = 1e-4
 """Widening below which no more corners are taken [m]."""
+
+INNER = 1
+"""To be raised when the same points get another capsule inside."""
 
 SIDES = 32
 """Sides of the prism about a cylinder."""
@@ -116,3 +119,40 @@ def _capsule_around(points: Array) -> Enclosure:
     if low > high:
         low = high = (low + high) / 2
     return Enclosure(np.array([centre + low * direction, centre + high * direction]), radius)
+
+
+def inner_capsule(shape: pin.GeometryObject) -> Enclosure:
+    """Capsule in a shape, in its joint's frame; equal to a capsule or sphere."""
+    corners, radius = core(shape)
+    if isinstance(shape.geometry, coal.Cylinder):
+        corners = prism(radius * np.cos(np.pi / SIDES), float(corners[1, 2]))
+    if len(corners) > 2:
+        fitted = cached_arrays("inner", INNER, corners.tobytes(), lambda: _capsule_in(corners))
+        corners, radius = fitted["corners"], float(fitted["radius"])
+    return Enclosure(corners[[0, -1]], radius).moved(shape.placement)
+
+
+def _capsule_in(points: Array) -> dict[str, Any]:
+    """Largest capsule found in the hull of points, about the centre of its largest ball."""
+    from scipy.optimize import linprog
+    from scipy.spatial import ConvexHull
+
+    size = float(np.ptp(points, axis=0).max())
+    planes = ConvexHull(points / size).equations
+    normals, offsets = planes[:, :3], -planes[:, 3]
+    rows = np.column_stack([normals, np.ones(len(normals))])
+    solved: Any = linprog([0, 0, 0, -1], rows, offsets, bounds=[(None, None)] * 4)
+    centre, largest = solved.x[:3], solved.x[3]
+    best, found = 0.0, {"corners": points[:1], "radius": 0.0}
+    for along in np.linalg.svd(points - points.mean(axis=0), full_matrices=False)[2]:
+        for radius in largest * np.linspace(0.4, 0.999, 13):
+            room = offsets - normals @ centre - radius
+            if room.min() <= 0:
+                continue
+            ends = room / (normals @ along + 1e-300)
+            low, high = ends[ends < 0].max(), ends[ends > 0].min()
+            volume = radius**2 * (high - low + 4 / 3 * radius)
+            if volume > best:
+                best, corners = volume, centre + np.outer([low, high], along)
+                found = {"corners": size * corners, "radius": size * radius}
+    return found

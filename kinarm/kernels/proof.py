@@ -6,8 +6,8 @@ Along the step it is the least height of some corners, whose second derivative i
 *bend* c: at the share s it is at least (1 - s) h + s h' - s (1 - s) c / 2. Where that proves
 nothing, a better plane is taken, and then each configuration between.
 
-Contact is proven between capsules, boxes and half-spaces that equal their shapes: two of their
-points that are closer than the radii about them prove an overlap.
+Contact is proven by capsules in the shapes of the arm, and by capsules, boxes and half-spaces that
+equal those of the scene: two points that are closer than the radii about them prove an overlap.
 """
 
 import math
@@ -256,29 +256,29 @@ def is_exact(shapes: ContactShapes, pair: int) -> bool:
 
 
 @inlined
-def radius_of(shapes: ContactShapes, body: int, poses: Array) -> float:
-    """Radius of a body's capsule [m]."""
+def radius_of(shapes: ContactShapes, capsules: Array, body: int, poses: Array) -> float:
+    """Radius of a body's capsule, of those about or in shapes [m]."""
     frame = shapes.bodies[body, 2]
-    radius = 0.0 * poses[0, 13] + shapes.capsules[body, 6]
+    radius = 0.0 * poses[0, 13] + capsules[body, 6]
     if is_placed(shapes, frame, poses):
-        radius = poses[frame, 3]
+        radius += poses[frame, 3]
     return radius
 
 
 @helper
 def overlap(shapes: ContactShapes, pair: int, poses: Array) -> float:
-    """Lower bound of an exact pair's overlap [m]; negative if apart."""
+    """Lower bound of a pair's overlap, by what lies in its shapes [m]; negative if apart."""
     kind, first, second = shapes.pairs[pair, 0], shapes.pairs[pair, 1], shapes.pairs[pair, 2]
-    a, b = axis_in_world(shapes, first, poses)
-    radius, frame = shapes.capsules[first, 6], shapes.bodies[second, 2]
+    a, b = axis_in_world(shapes, shapes.inner, first, poses)
+    radius = shapes.inner[first, 6] + radius_of(shapes, shapes.inner, second, poses)
+    frame = shapes.bodies[second, 2]
     if kind == WITH_HALFSPACE:
         x, y, z, offset = surface(poses, frame)
         start, end = x * a[0] + y * a[1] + z * a[2], x * b[0] + y * b[1] + z * b[2]
         return radius - (min(start, end) - offset)
     if kind == BETWEEN_CAPSULES:
-        c, d = axis_in_world(shapes, second, poses)
+        c, d = axis_in_world(shapes, shapes.inner, second, poses)
         x, y, z = between_segments(a, b, c, d)
-        radius += radius_of(shapes, second, poses)
     else:
         hx, hy, hz = poses[frame, 0], poses[frame, 1], poses[frame, 2]
         a, b = to_frame(poses, frame, a), to_frame(poses, frame, b)
@@ -292,11 +292,10 @@ def overlap(shapes: ContactShapes, pair: int, poses: Array) -> float:
 
 @inlined
 def deepest_overlap(shapes: ContactShapes, poses: Array) -> float:
-    """Lower bound of the deepest overlap of all exact pairs [m]."""
+    """Lower bound of the deepest overlap of all pairs [m]."""
     depth = 0.0 * poses[0, 13] - 1.0
     for pair in range(shapes.pairs.shape[0]):
-        if is_exact(shapes, pair):
-            depth = max(depth, overlap(shapes, pair, poses))
+        depth = max(depth, overlap(shapes, pair, poses))
     return depth
 
 
@@ -323,7 +322,7 @@ def first_contact(
     else:
         place_between(k, tested, lane, chain, block, alone)
     for pair in range(shapes.pairs.shape[0]):
-        if is_exact(shapes, pair) and overlap(shapes, pair, alone.before) > DEPTH:
+        if overlap(shapes, pair, alone.before) > DEPTH:
             return pair + 1
         if not is_proven_apart(pair, lane, shapes, block, alone):
             return 0

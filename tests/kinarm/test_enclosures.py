@@ -5,8 +5,17 @@ import numpy as np
 import pinocchio as pin
 import pytest
 from scipy.optimize import linprog
+from scipy.spatial import ConvexHull
 
-from kinarm.enclosures import FEW, MANY, enclosing_capsule, enclosing_polytope
+from kinarm.enclosures import (
+    FEW,
+    MANY,
+    SOME,
+    Enclosure,
+    enclosing_capsule,
+    enclosing_polytope,
+    inner_capsule,
+)
 from kinarm.errors import ArmError
 
 PLACED = pin.SE3(pin.Quaternion(0.5, 0.1, -0.7, 0.3).normalized(), np.array([0.1, -0.2, 0.3]))
@@ -53,7 +62,7 @@ def test_equals_simple_shapes(name, directions):
     np.testing.assert_allclose(found, expected, rtol=0, atol=1e-12)
 
 
-@pytest.mark.parametrize(("most", "loose"), [(FEW, 0.06), (MANY, 0.004)])
+@pytest.mark.parametrize(("most", "loose"), [(FEW, 0.06), (SOME, 0.004), (MANY, 0.004)])
 def test_encloses_a_cylinder_closely(most, loose, directions):
     d = local(directions)
     exact = 0.2 * np.hypot(d[:, 0], d[:, 1]) + 0.3 * np.abs(d[:, 2])
@@ -146,3 +155,35 @@ def test_other_shapes_are_refused(enclosing):
     shape = pin.GeometryObject("cone_0", 1, pin.SE3.Identity(), coal.Cone(0.1, 0.2))
     with pytest.raises(ArmError, match="'cone_0' is a Cone: not supported"):
         enclosing(shape)
+
+
+@pytest.mark.parametrize(
+    ("geometry", "share"),
+    [
+        (coal.Sphere(0.2), 1.0),
+        (coal.Capsule(0.1, 0.6), 1.0),
+        (coal.Cylinder(0.1, 0.6), 0.85),
+        (coal.Cylinder(0.3, 0.1), 0.05),
+        (coal.Box(0.2, 0.2, 0.9), 0.7),
+        (coal.Box(0.5, 0.4, 0.1), 0.1),
+        (hull(np.random.default_rng(5).normal(size=(60, 3)) * [0.3, 0.1, 0.05]), 0.2),
+        (hull(np.random.default_rng(6).normal(size=(8, 3)) * 0.1), 0.2),
+    ],
+    ids=lambda value: type(value).__name__ if isinstance(value, coal.CollisionGeometry) else "",
+)
+def test_the_capsule_in_a_shape(geometry, share, directions):
+    """It reaches no farther than the shape in any direction, and fills a fair share of it."""
+    (start, end), radius = inner_capsule(placed(geometry))
+    capsule = np.pi * radius**2 * (np.linalg.norm(end - start) + 4 / 3 * radius)
+    if isinstance(geometry, coal.ConvexBase):
+        points = np.array([PLACED.act(point) for point in geometry.points()])
+        reach, whole = (points @ directions.T).max(axis=0), ConvexHull(points).volume
+    else:
+        reach = support(enclosing_polytope(placed(geometry)), directions)
+        whole = geometry.computeVolume()
+    if isinstance(geometry, coal.Cylinder):
+        d = local(directions)
+        reach = geometry.radius * np.hypot(d[:, 0], d[:, 1]) + geometry.halfLength * np.abs(d[:, 2])
+        reach += directions @ PLACED.translation
+    assert (support(Enclosure(np.array([start, end]), radius), directions) <= reach + 1e-9).all()
+    assert share - 1e-9 < capsule / whole < 1 + 1e-9
