@@ -188,7 +188,7 @@ class HeldBody(Body):
     Parameters
     ----------
     link : str
-        The link.
+        Link that holds it.
     """
 
     link: str

@@ -88,7 +88,7 @@ class UnknownNameError(InvalidInputError):
         self.kind, self.given, self.available = kind, given, tuple(available)
         super().__init__(
             f"unknown {kind} {given!r}{meant(given, self.available)}; "
-            f"available: {', '.join(self.available)}"
+            f"available: {', '.join(self.available) or 'none'}"
         )
 
 

@@ -99,6 +99,11 @@ def _reduced(path: Path, specification: ArmSpecification) -> Description:
     robot = read_robot(path)
     joints = read_joints(robot)
     links = [link.get("name", "") for link in robot.findall("link")]
+    with_mesh = [
+        link.get("name", "")
+        for link in robot.iterfind("link[collision]")
+        if link.find("collision/geometry/mesh") is not None
+    ]
     tool, notes = _tool_frame(specification.tool_frame, joints, links)
     asked, limits = specification.held or {}, specification.limits or {}
     moving = [joint.name for joint in joints.values() if joint.kind in MOVING]
@@ -110,7 +115,7 @@ def _reduced(path: Path, specification: ArmSpecification) -> Description:
         ("joint in held", asked, moving),
         ("joint in limits", limits, moving),
         ("joint in actuated", specification.actuated or (), kept),
-        ("link in pieces", specification.pieces or {}, links),
+        ("link with a mesh in pieces", specification.pieces or {}, with_mesh),
         ("link in held_bodies", [body.link for body in bodies], links),
         ("link in allowed_contacts", contacts, named_parts),
     ):
