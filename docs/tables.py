@@ -17,7 +17,7 @@ import numpy as np
 from kinarm import PROBLEMS, REWARD_TERMS, Arm, RewardWeights, Scene, Simulator
 from kinarm.__main__ import COMMANDS
 from kinarm._fields import summary_of
-from kinarm.collision import link_of
+from kinarm.contact_pairs import link_of
 from kinarm.enclosures import enclosing_capsule
 from kinarm.envs import ENVIRONMENTS
 from kinarm.evaluation import METRICS

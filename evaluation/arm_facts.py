@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 from kinarm.arm import Arm
 from kinarm.arm_specification import ArmFile
 from kinarm.clearance import SAMPLES, ContactStatistics, arm_warnings, contact_on_bare_ground
-from kinarm.collision import ContactModel, are_neighbours, link_of
+from kinarm.collision import ContactModel
+from kinarm.contact_pairs import are_neighbours, link_of
 from kinarm.evaluation.report.templating import template_environment
 from kinarm.evaluation.self_contact import SelfContact
 

@@ -17,12 +17,11 @@ from kinarm.evaluation.bounds import oracle_bounds
 from kinarm.evaluation.outcomes import Holding
 from kinarm.evaluation.predictors import Actor, Wrapper, run_remembering, run_wrapped
 from kinarm.evaluation.trials import TrialSet, trial_generator
-from kinarm.networks import Layer, Networks
+from kinarm.networks import Layer, Networks, PolicyFunction
 from kinarm.observation import observation_size
 from kinarm.policies.policy import Policy
 from kinarm.policies.provenance import normalization_remark
 from kinarm.problem import ReachProblem
-from kinarm.simulator import PolicyFunction
 
 NEVER = sys.float_info.min
 """A tolerance that nothing meets [m]."""

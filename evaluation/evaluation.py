@@ -27,10 +27,10 @@ from kinarm.evaluation.outcomes import Holding, Outcomes, failure_causes
 from kinarm.evaluation.predictors import Wrapper
 from kinarm.evaluation.statistics import Estimate
 from kinarm.evaluation.trials import TrialSet
+from kinarm.networks import PolicyFunction
 from kinarm.policies.oracle.oracle import OracleSolutions
 from kinarm.policies.policy import Policy
 from kinarm.problem import ProblemLike, ReachProblem
-from kinarm.simulator import PolicyFunction
 
 if TYPE_CHECKING:
     from kinarm.evaluation.summary import Faced

@@ -12,13 +12,13 @@ from kinarm._files import first_line
 from kinarm.errors import InvalidInputError, UnknownNameError
 from kinarm.evaluation.contestants import UNTRAINED, Contestant, Predictor
 from kinarm.evaluation.predictors import Actor, Wrapper
+from kinarm.networks import PolicyFunction
 from kinarm.policies.conversion.models import saved_model
 from kinarm.policies.conversion.sb3 import native_statistics
 from kinarm.policies.library import models_in, policy_files
 from kinarm.policies.policy import Policy
 from kinarm.policies.provenance import normalization_remark
 from kinarm.problem import ProblemLike
-from kinarm.simulator import PolicyFunction
 
 
 def find_contestants(

@@ -15,8 +15,9 @@ from kinarm.envs import ReachEnv
 from kinarm.episodes import RUNNING, Episodes, Rollouts, StepResult
 from kinarm.evaluation.trials import TrialSet
 from kinarm.kernels.compiling import Array
+from kinarm.networks import takes_rows
 from kinarm.policies.policy import Policy
-from kinarm.simulator import Simulator, takes_rows
+from kinarm.simulator import Simulator
 
 Wrapper = Callable[[Any], Any]
 """Wraps an environment: one of Gymnasium, or ``venv``, a ``VecEnv`` of Stable-Baselines3."""

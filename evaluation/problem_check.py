@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from kinarm.clearance import ContactStatistics, random_configurations
+from kinarm.clearance import SAMPLES, ContactStatistics, random_configurations
 from kinarm.evaluation.bounds import oracle_bounds
 from kinarm.evaluation.outcomes import Pair
 from kinarm.evaluation.report.templating import template_environment
@@ -102,9 +102,11 @@ def check_problem(
     on_progress : callable, optional
         Called with the number of trials solved so far and in all.
     """
-    contact = ContactStatistics.sample(world.contact_model)
+    q, starts = random_configurations(world.contact_model, SAMPLES), random_starts(world)
+    scenes = list(_some_scenes(world, q))
+    contact = ContactStatistics.sample(world.contact_model, scenes=scenes)
     contact.check_movable(world.arm.name)
-    free_starts = ~world.screen(random_starts(world))[1]
+    free_starts = ~world.screened(starts, _some_scenes(world, starts))[1]
     return ProblemCheck(
         problem=world.problem.to_json(),
         digest=world.problem.digest,
@@ -122,6 +124,11 @@ def check_problem(
         ),
         mirror=mirror_findings(world),
     )
+
+
+def _some_scenes(world: World, starts: NDArray[np.float64]) -> NDArray[np.float64]:
+    """A scene of each start, if there are random bodies, with a random goal."""
+    return world.scenes_of(starts, world.goals.draw(np.random.default_rng(0), len(starts)))
 
 
 def _goals(trials: TrialSet, on_progress: Progress | None) -> Goals:

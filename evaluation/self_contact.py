@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 
 from kinarm.arm_specification import MOST_PIECES
 from kinarm.clearance import SAMPLES, random_configurations
-from kinarm.collision import TOUCH_AT_HOME, ContactModel, link_of, make_verdicts_reliable
+from kinarm.collision import ContactModel
+from kinarm.contact_pairs import TOUCH_AT_HOME, link_of, make_verdicts_reliable
 
 MUCH, SOME = 0.02, 0.01
 """Shares of configurations that touch by hulls alone: to be warned of, and to name a link for."""

@@ -173,7 +173,7 @@ class ArmFile(Checked):
     def _read(cls, path: Path) -> "ArmFile":
         """Read an arm file."""
         entries = read_toml(path, "arm")
-        read_meshes(entries.get("arm"), "held_bodies", path)
+        read_meshes(entries.get("arm"), path)
         file = from_plain(cls, entries, str(path))
         if file.arm.source.endswith(".toml"):
             raise ArmError(f"{path}: 'arm.source' must be a URDF or a known arm, no arm file")

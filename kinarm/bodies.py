@@ -1,4 +1,4 @@
-"""Bodies: what can touch, a shape with a pose.
+"""Bodies: what can touch, a shape with a pose, given or drawn for every episode.
 
 What cannot be is a `ProblemError`.
 """
@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from kinarm._fields import OPTIONAL, Checked
 from kinarm._files import absolute
-from kinarm.errors import InvalidInputError, KinarmError, ProblemError
+from kinarm.errors import FROM_ZERO, NOT_NEGATIVE, InvalidInputError, KinarmError, ProblemError
 
 Point = tuple[float, float, float]
 
@@ -26,6 +26,12 @@ MOST_VERTICES = 1000
 
 FLAT = 1e-6
 """Thickness over width of a mesh that has no volume."""
+
+PARKED = (0.0, 0.0, -1e6)
+"""Where bodies are that an episode does without [m]."""
+
+MOST = 100
+"""Bodies of an entry at most."""
 
 SHAPES = {
     "box": ("x", "y", "z"),
@@ -182,6 +188,85 @@ class Body(Checked):
 
 
 @dataclass(frozen=True, kw_only=True)
+class RandomBodies(Checked):
+    """Bodies of one shape, whose number, sizes and poses differ between episodes.
+
+    All are uniform within their ranges.
+
+    Parameters
+    ----------
+    name : str
+        How contact reports call them, with a number.
+    shape : str
+        A shape of `kinarm.Body`, but no half-space.
+    count : tuple of int
+        The fewest and the most of them.
+    smallest, largest : tuple of float
+        Range of their sizes, as of `kinarm.Body` [m].
+    vertices : tuple
+        Points of a mesh, which has one size [m].
+    near : str
+        What their positions are relative to: ``"world"``; ``"path"``, a random
+        point between the tool at the start and the goal; or the name of an
+        obstacle, an upright box, on whose top they stand.
+    lower, upper : tuple of float
+        Range of their positions, relative to that [m]. On an obstacle, the
+        whole top by default.
+    turned : str
+        ``"no"``, ``"yaw"``, about the vertical, or ``"any"``.
+    clear_of_goal : float
+        Distance that they keep from the goal [m].
+    """
+
+    name: str
+    shape: Literal["box", "sphere", "capsule", "cylinder", "mesh"]
+    count: tuple[int, int] = field(default=(1, 1), metadata={**FROM_ZERO, "at_most": MOST})
+    smallest: tuple[float, ...] = ()
+    largest: tuple[float, ...] = ()
+    vertices: tuple[Point, ...] = field(default=(), metadata=OPTIONAL)
+    near: str = "world"
+    lower: Point | None = None
+    upper: Point | None = None
+    turned: Literal["no", "yaw", "any"] = "no"
+    clear_of_goal: float = field(default=0.05, metadata=NOT_NEGATIVE)
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        told = f"random bodies {self.name!r}"
+        if self.count[0] > self.count[1]:
+            raise ProblemError(f"{told}: count goes from {self.count[0]} to {self.count[1]}")
+        for size in (self.smallest, self.largest):
+            self.sized(size)
+        if any(low > high for low, high in zip(self.smallest, self.largest, strict=True)):
+            raise ProblemError(f"{told}: a size of smallest exceeds that of largest")
+        if (self.lower is None) != (self.upper is None):
+            raise ProblemError(f"{told} have one of lower and upper only")
+        if self.lower is None or self.upper is None:
+            if self.near == "world":
+                raise ProblemError(f"{told} need lower and upper, the range of their positions")
+        elif any(low > high for low, high in zip(self.lower, self.upper, strict=True)):
+            raise ProblemError(f"{told}: lower {self.lower} exceeds upper {self.upper}")
+        if self.turned == "any" and self.near not in ("world", "path"):
+            raise ProblemError(f"{told} stand on an obstacle: turned must be no or yaw")
+
+    @property
+    def slots(self) -> tuple[Body, ...]:
+        """As many bodies as there may be, far away."""
+        numbers = range(1, self.count[1] + 1)
+        return tuple(self.sized(self.largest, f"{self.name} {k}") for k in numbers)
+
+    def sized(self, size: tuple[float, ...], name: str = "") -> Body:
+        """One of them far away, of a size and name."""
+        return Body(
+            name=name or self.name,
+            shape=self.shape,
+            size=size,
+            vertices=self.vertices,
+            position=PARKED,
+        )
+
+
+@dataclass(frozen=True, kw_only=True)
 class HeldBody(Body):
     """A body that a link of the arm holds: its pose is in the link's frame.
 
@@ -199,18 +284,19 @@ class HeldBody(Body):
             raise ProblemError(f"{self._told} has no end: link {self.link!r} cannot hold it")
 
 
-def read_meshes(table: Any, name: str, path: Path) -> None:
-    """Put vertices in the place of mesh files, in a list of bodies of a file's table.
+def read_meshes(table: Any, path: Path) -> None:
+    """Put vertices in the place of mesh files, in the lists of bodies of a file's table.
 
-    Parameters
-    ----------
-    table, name
-        The table, and the entry with the list.
-    path : Path
-        The file, from whose folder meshes are named.
+    Meshes are named from the folder of the file, at ``path``.
     """
-    bodies = table.get(name) if isinstance(table, Mapping) else None
-    for number, entry in enumerate(bodies if isinstance(bodies, list) else ()):
+    lists = table.items() if isinstance(table, Mapping) else ()
+    listed = (
+        (name, *each)
+        for name, bodies in lists
+        if isinstance(bodies, list)
+        for each in enumerate(bodies)
+    )
+    for name, number, entry in listed:
         if isinstance(entry, dict) and isinstance(entry.get("mesh"), str):
             from kinarm.meshes import mesh_vertices
 

@@ -3,6 +3,7 @@
 That no configuration is found for a goal proves nothing; the oracle does.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -14,7 +15,8 @@ from numpy.typing import NDArray
 from kinarm._parallel import run_rows
 from kinarm.arm import Arm
 from kinarm.arm_specification import arm_names
-from kinarm.collision import TOUCH_AT_HOME, ContactModel, make_verdicts_reliable
+from kinarm.collision import ContactModel
+from kinarm.contact_pairs import TOUCH_AT_HOME, make_verdicts_reliable
 from kinarm.enclosures import enclosing_polytope
 from kinarm.errors import ProblemError
 from kinarm.kernels.closest import Bodies, closest_pairs
@@ -143,16 +145,23 @@ class ContactStatistics:
     touching: NDArray[np.bool_]
 
     @classmethod
-    def sample(cls, model: ContactModel, count: int = SAMPLES) -> "ContactStatistics":
-        """Ask Coal for every pair, at `random_configurations`."""
-        q = random_configurations(model, count)
-        data = model.arm.model.createData()
-        geometry_data = make_verdicts_reliable(model.geometry.createData())
+    def sample(
+        cls, model: ContactModel, count: int = SAMPLES, scenes: Sequence[Array] = ()
+    ) -> "ContactStatistics":
+        """Ask Coal for every pair, at `random_configurations`, each in a scene if there are some.
+
+        These have the shape (count, n_placed, 16).
+        """
+        q, asked = random_configurations(model, count), model.at(scenes[0]) if scenes else model
+        data = asked.arm.model.createData()
+        geometry_data = make_verdicts_reliable(asked.geometry.createData())
         results = list(geometry_data.collisionResults)
         touching = np.zeros((count, len(results)), dtype=bool)
-        for row, configuration in zip(touching, q, strict=True):
+        for number, (row, configuration) in enumerate(zip(touching, q, strict=True)):
+            if scenes:
+                model.at(scenes[number])
             pin.computeCollisions(
-                model.arm.model, data, model.geometry, geometry_data, configuration, False
+                asked.arm.model, data, asked.geometry, geometry_data, configuration, False
             )
             row[:] = [result.isCollision() for result in results]
         return cls(model.pair_names, touching)

@@ -94,6 +94,9 @@ class Episodes(NamedTuple):
     planes : ndarray, shape (n, n_pairs, PLANE)
         Separating plane of each pair and height above it at ``q``; see
         ``kinarm.kernels.planes``.
+    scenes : ndarray, shape (n, n_placed, 16) or (0, n_placed, 16)
+        Rows in ``poses`` of each episode's bodies, if they differ; see
+        ``kinarm.contact_shapes``.
     goal, distance : ndarray, shape (n, 3) and (n,)
         Goal position, and the tool's distance from it [m].
     observation : ndarray, shape (n, n_observations)
@@ -117,6 +120,7 @@ class Episodes(NamedTuple):
     touched: NDArray[np.int64]
     cleared: NDArray[np.bool_]
     planes: Array
+    scenes: Array
     goal: Array
     observation: Array
     distance: Array
@@ -125,6 +129,10 @@ class Episodes(NamedTuple):
     moments: Array
     shift: Array
     path: Array
+
+    def scenes_at(self, rows: NDArray[np.int64]) -> Array:
+        """Scenes of some episodes; empty if all have the same."""
+        return self.scenes[rows] if len(self.scenes) else self.scenes
 
     def resume(self, rows: NDArray[np.int64], horizon: int) -> None:
         """Let episodes go on after success or contact, up to the horizon."""

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import inspect
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import chain, pairwise
-from typing import Literal, NamedTuple, Protocol, get_args, runtime_checkable
+from typing import Any, Literal, NamedTuple, Protocol, get_args, runtime_checkable
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -184,6 +185,18 @@ def split_parameters(parameters: Array, widths: Sequence[int]) -> Iterator[Layer
         weights = parameters[:, start : start + n_in * n_out].reshape(-1, n_in, n_out)
         start += (n_in + 1) * n_out
         yield Layer(weights.transpose(0, 2, 1), parameters[:, start - n_out : start])
+
+
+PolicyFunction = Callable[..., ArrayLike]
+"""Observations, shape (n, n_observations), to actions, shape (n, n_actuated)."""
+
+
+def takes_rows(policy: Callable[..., Any]) -> bool:
+    """Whether a function of observations also asks for the numbers of their episodes."""
+    try:
+        return "rows" in inspect.signature(policy).parameters
+    except (TypeError, ValueError):  # of functions without a signature
+        return False
 
 
 def network_control(

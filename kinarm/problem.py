@@ -281,8 +281,8 @@ def read_problem(path: Path) -> dict[str, Any]:
     if isinstance(scene, str):
         entries["scene"] = to_plain(find_scene(_beside(path, scene)))
     else:
-        read_meshes(scene, "obstacles", path)
-    read_meshes(entries.get("arm"), "held_bodies", path)
+        read_meshes(scene, path)
+    read_meshes(entries.get("arm"), path)
     if isinstance(task, str):
         entries["task"] = to_plain(find_task(_beside(path, task)))
     elif isinstance(task, Mapping):
@@ -321,7 +321,7 @@ def _find_part(kind: type[Part], what: str, name: str | Path) -> Part:
         if "goal_regions" not in entries:
             raise InvalidInputError(f"{path}: 'goal_regions' is missing: where goals may lie")
         entries = {"obstacles": [], **entries}
-        read_meshes(entries, "obstacles", path)
+        read_meshes(entries, path)
     return from_plain(kind, entries, str(path))
 
 

@@ -212,7 +212,8 @@ def record_rollouts(
         goal = rollouts.goals[number]
         touch = None
         if rollouts.collision[number]:
-            touch = world.contact(rollouts.configurations[number], rollouts.targets[number])
+            there = world.in_scene(rollouts.starts[number], goal)
+            touch = there.contact(rollouts.configurations[number], rollouts.targets[number])
         recordings.append(
             Recording(
                 policy=policy,
@@ -263,9 +264,10 @@ def record_path(
     """
     world = problem if isinstance(problem, World) else World(problem)
     points = _within_limits(world, path)
+    aim = world.poses(points[-1])[:3, 3] if goal is None else finite_array("goal", goal, (3,))
+    world = world.in_scene(points[0], aim)
     if (pair := world.contact_pair(points[0])) is not None:
         raise StartInContactError(0, pair)
-    aim = world.poses(points[-1])[:3, 3] if goal is None else finite_array("goal", goal, (3,))
     states = _stepwise(world, points)
     tested = world.substeps(states[:-1], states[1:])
     touching = world.in_contact(tested.reshape(-1, world.arm.n_joints)).reshape(tested.shape[:2])

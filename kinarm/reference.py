@@ -12,7 +12,8 @@ import pinocchio as pin
 from numpy.typing import ArrayLike
 
 from kinarm.arm import Arm
-from kinarm.collision import make_verdicts_reliable, start_anew
+from kinarm.collision import ContactModel
+from kinarm.contact_pairs import make_verdicts_reliable, start_anew
 from kinarm.kernels.compiling import Array
 from kinarm.simulator import Simulator
 
@@ -49,10 +50,10 @@ class ReferenceSimulator:
         self.arm: Arm = simulator.arm
         self.task = simulator.task
         self.step_limit = simulator.step_limit
-        self.contact_model = simulator.world.contact_model
         self.tested = simulator.problem.stepping.tested_configurations
         self._data = self.arm.model.createData()
-        self._geometry_data = make_verdicts_reliable(self.contact_model.geometry.createData())
+        self._world = simulator.world
+        self._begin(simulator.world.contact_model)
 
     def rollout(
         self, policy: Callable[[Array], ArrayLike], start: Array, goal: Array
@@ -67,6 +68,7 @@ class ReferenceSimulator:
         start, goal : ndarray, shape (n_joints,) and (3,)
             Start configuration [rad or m] and goal position [m].
         """
+        self._begin(self._world.in_scene(start, goal).contact_model)
         q, reward = np.array(start), self.task.reward
         observation, distance = self.observe(q, goal)
         path, observations = [q], [observation]
@@ -101,6 +103,11 @@ class ReferenceSimulator:
             distance=distance,
             contact=contact,
         )
+
+    def _begin(self, contact_model: ContactModel) -> None:
+        """Take the bodies of an episode."""
+        self.contact_model = contact_model
+        self._geometry_data = make_verdicts_reliable(contact_model.geometry.createData())
 
     def observe(self, q: Array, goal: Array) -> tuple[Array, float]:
         """Observation of a configuration and the distance to the goal [m]."""

@@ -74,7 +74,7 @@ def draw_for_each(
             starts[pending] = proposed = listed[(uniforms[:, 0] * len(listed)).astype(np.int64)]
         else:
             proposed = propose_starts(pending, uniforms, lower, extent, starts)
-        tools, touching = world.screened(proposed)
+        tools, touching = world.screened(proposed, world.scenes_of(proposed, goals[pending]))
         pending = rejected_rows(pending, goals, tools, touching, task.tolerance)
         if pending.size == 0:
             shape = len(rngs), count

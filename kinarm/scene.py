@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kinarm._fields import OPTIONAL, Checked
-from kinarm.bodies import Body, Point, rotation_matrix
-from kinarm.errors import NOT_NEGATIVE, ProblemError, UnknownNameError
+from kinarm.bodies import Body, Point, RandomBodies, rotation_matrix
+from kinarm.errors import FROM_ZERO, NOT_NEGATIVE, ProblemError, UnknownNameError
 
 ROUNDING = 1e-12
 """Lengths that differ less are the same [m]."""
@@ -132,6 +132,11 @@ class Scene(Checked):
         Edge of the cube that marks a goal, which is no obstacle [m].
     obstacles : tuple of Obstacle or Body
         Solid bodies, whether goals lie on them or not.
+    random_bodies : tuple of RandomBodies
+        Further ones, drawn anew for every episode: from the seed, its start and
+        its goal, so that these have one scene.
+    seed : int
+        Seed of these draws.
     goal_regions : tuple of GoalRegion
         Where goals may lie.
     mount : Mount
@@ -141,12 +146,15 @@ class Scene(Checked):
     ground: bool = True
     cube_edge: float = field(default=0.05, metadata=NOT_NEGATIVE)
     obstacles: tuple[Obstacle | Body, ...] = PAPER_BENCHES
+    random_bodies: tuple[RandomBodies, ...] = field(default=(), metadata=OPTIONAL)
+    seed: int = field(default=0, metadata={**OPTIONAL, **FROM_ZERO})
     goal_regions: tuple[GoalRegion, ...] = PAPER_GOALS
     mount: Mount = field(default_factory=Mount, metadata=OPTIONAL)
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        for what, members in (("obstacle", self.obstacles), ("goal region", self.goal_regions)):
+        placed = self.bodies if self.random_bodies else self.obstacles
+        for what, members in (("obstacle", placed), ("goal region", self.goal_regions)):
             if len(members) > MOST_MEMBERS:
                 raise ProblemError(f"{len(members)} {what}s: at most {MOST_MEMBERS} are possible")
             names = [member.name for member in members]
@@ -163,10 +171,11 @@ class Scene(Checked):
 
     @cached_property
     def bodies(self) -> tuple[Body, ...]:
-        """All that the arm may touch: the obstacles, then the ground as a half-space."""
+        """All that the arm may touch: obstacles, random bodies, far away, and the ground."""
         obstacles = (each if isinstance(each, Body) else each.body for each in self.obstacles)
+        random = (body for each in self.random_bodies for body in each.slots)
         ground = (Body(name="ground", shape="halfspace"),) if self.ground else ()
-        return (*obstacles, *ground)
+        return (*obstacles, *random, *ground)
 
     def obstacle_around(self, region: GoalRegion) -> Body | None:
         """First body that wholly contains a goal region, or None.

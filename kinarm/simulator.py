@@ -1,7 +1,6 @@
 """The simulator: a problem, stepped in batches of episodes."""
 
-import inspect
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from contextlib import suppress
 from copy import copy
 from typing import Any
@@ -17,23 +16,12 @@ from kinarm.errors import LARGEST, InvalidInputError, StartInContactError, finit
 from kinarm.kernels.compiling import Array
 from kinarm.kernels.rollout import advance, allow_one_step, begin, refuse, results_of_step
 from kinarm.kernels.session import Session
-from kinarm.networks import CompiledPolicy, Networks, network_control
+from kinarm.networks import CompiledPolicy, Networks, PolicyFunction, network_control, takes_rows
 from kinarm.problem import ProblemLike, ReachProblem
 from kinarm.scenarios import draw_scenarios
 from kinarm.scene import Scene
 from kinarm.task import ReachTask
 from kinarm.world import World
-
-PolicyFunction = Callable[..., ArrayLike]
-"""Observations, shape (n, n_observations), to actions, shape (n, n_actuated)."""
-
-
-def takes_rows(policy: Callable[..., Any]) -> bool:
-    """Whether a function of observations also asks for the numbers of their episodes."""
-    try:
-        return "rows" in inspect.signature(policy).parameters
-    except (TypeError, ValueError):  # of functions without a signature
-        return False
 
 
 class Simulator:
@@ -119,6 +107,12 @@ class Simulator:
         other.world = self.world.with_tolerance(tolerance)
         return other
 
+    def in_scene(self, start: Array, goal: Array) -> "Simulator":
+        """The simulator of one episode; see `kinarm.World.in_scene`."""
+        other = copy(self)
+        other.world = self.world.in_scene(start, goal)
+        return other
+
     def sample(
         self, rng: np.random.Generator, count: int, *, start_spread: float | None = None
     ) -> tuple[Array, Array]:
@@ -131,7 +125,14 @@ class Simulator:
         """
         return draw_scenarios(self.world, rng, count, start_spread=start_spread)
 
-    def reset(self, starts: ArrayLike, goals: ArrayLike, *, record: bool = False) -> Episodes:
+    def reset(
+        self,
+        starts: ArrayLike,
+        goals: ArrayLike,
+        *,
+        record: bool = False,
+        origins: Array | None = None,
+    ) -> Episodes:
         """Begin a batch of episodes, to be driven by `step`.
 
         Parameters
@@ -140,8 +141,11 @@ class Simulator:
             Start configurations [rad or m], and goal positions [m].
         record : bool
             Keep the configurations visited.
+        origins : ndarray, shape (n, n_joints), optional
+            Where episodes that go on at these starts had begun [rad or m]:
+            random bodies stay.
         """
-        return self._begin(*self.check_scenarios(starts, goals), record=record)
+        return self._begin(*self.check_scenarios(starts, goals), record=record, origins=origins)
 
     def step(self, episodes: Episodes, actions: ArrayLike) -> StepResult:
         """Advance every running episode by one step, in place.
@@ -223,12 +227,11 @@ class Simulator:
 
     def contact_pairs(self, rollouts: Rollouts) -> tuple[tuple[str, str] | None, ...]:
         """Bodies that touched, per episode; None where nothing did."""
-        return tuple(
-            self.world.contact_pair(rollouts.configurations[i], rollouts.targets[i])
-            if collided
-            else None
-            for i, collided in enumerate(rollouts.collision)
-        )
+        pairs: list[tuple[str, str] | None] = [None] * len(rollouts)
+        for i in np.flatnonzero(rollouts.collision):
+            there = self.world.in_scene(rollouts.starts[i], rollouts.goals[i])
+            pairs[i] = there.contact_pair(rollouts.configurations[i], rollouts.targets[i])
+        return tuple(pairs)
 
     def begin(self, episodes: Episodes, rows: NDArray[np.int64]) -> None:
         """Start episodes of some rows, in place, at their ``q`` and ``goal``."""
@@ -243,10 +246,10 @@ class Simulator:
         return within_limits("starts", q, self.arm.chain, self.arm.joint_names), goal
 
     def _begin(
-        self, starts: Array, goals: Array, *, record: bool, shift: Array | None = None
+        self, starts: Array, goals: Array, origins: Array | None = None, **kept: Any
     ) -> Episodes:
-        episodes = self.world.episodes(starts, goals, record=record, shift=shift)
-        self._start(np.arange(len(starts)), self._stepped(episodes))
+        episodes = self.world.episodes(starts, goals, **kept)
+        self._start(np.arange(len(starts)), self._stepped(episodes), origins)
         return episodes
 
     def _refilled(
@@ -267,16 +270,22 @@ class Simulator:
         self._advance(session, n * self.task.horizon)
         return session.episodes
 
-    def _start(self, rows: NDArray[np.int64], session: Session) -> None:
-        """Start some episodes; Coal decides about doubtful starts."""
+    def _start(
+        self, rows: NDArray[np.int64], session: Session, origins: Array | None = None
+    ) -> None:
+        """Start some episodes in their scenes; Coal decides about doubtful starts."""
+        episodes, contacts = session.episodes, self.world.contact_model
+        if len(episodes.scenes):
+            begun = episodes.q[rows] if origins is None else origins
+            episodes.scenes[rows] = self.world.scenes_of(begun, episodes.goal[rows])
         if not run_together(begin, len(rows), self.threads, session.of_thread, rows):
             return
-        episodes, contacts = session.episodes, self.world.contact_model
         paused = rows[episodes.status[rows] == PAUSED]
-        touching = contacts.in_contact(episodes.q[paused])
+        touching = contacts.touching(episodes.q[paused], episodes.scenes_at(paused))
         if touching.any():
             index = int(paused[touching.argmax()])
-            pair = contacts.contact_pair(episodes.q[index])
+            there = self.world.in_scene(episodes.q[index], episodes.goal[index])
+            pair = there.contact_pair(episodes.q[index])
             raise StartInContactError(index, pair or ("arm", "scene"))
         episodes.status[paused] = RUNNING
 
@@ -314,7 +323,8 @@ class Simulator:
         episodes = session.episodes
         ways = self.world.substeps(episodes.q[paused], episodes.target[paused])
         contacts = self.world.contact_model
-        touched, asked = contacts.first_contacts(ways, episodes.doubt[paused])
+        doubtful = ways, episodes.doubt[paused], episodes.scenes_at(paused)
+        touched, asked = contacts.first_contacts(*doubtful)
         self.checked_by_coal += asked
         refused = touched != 0
         resumed: NDArray[np.int64] = paused[~refused]

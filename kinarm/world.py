@@ -12,6 +12,7 @@ from kinarm.chain import Chain, within_limits
 from kinarm.clearance import Clearance, flattened, measure_clearance
 from kinarm.collision import Contact, ContactModel
 from kinarm.contact_shapes import PLANE, ContactShapes
+from kinarm.episode_scenes import drawn_rows
 from kinarm.episodes import Control, Episodes, Rules
 from kinarm.errors import ProblemError, finite_array, one_or_many, whole_number
 from kinarm.inverse_kinematics import InverseKinematics
@@ -23,6 +24,7 @@ from kinarm.kernels.screening import screen
 from kinarm.kernels.session import Alone, Block, Session, furnish, work_space
 from kinarm.observation import observation_size
 from kinarm.problem import ProblemLike, ReachProblem
+from kinarm.scene_draws import SceneDraws
 from kinarm.task import REWARD_TERMS, Goals
 
 
@@ -46,6 +48,8 @@ class World(InverseKinematics):
         The task's starts [rad or m]; empty if it has none.
     rules : Rules
         Task and motion limits for the kernels.
+    has_random_bodies : bool
+        Whether each episode has a scene of its own.
     """
 
     def __init__(self, problem: ProblemLike, *, threads: int | None = None) -> None:
@@ -65,6 +69,7 @@ class World(InverseKinematics):
             horizon=int(task.horizon),
             reward=task.reward.vector,
         )
+        self.has_random_bodies = bool(self.problem.scene.random_bodies)
         self._idle: list[tuple[Block, Alone]] = []
         self._shares = np.arange(1, n_tested + 1)[:, None] / n_tested
 
@@ -91,8 +96,9 @@ class World(InverseKinematics):
         return other
 
     def __getstate__(self) -> dict[str, Any]:
-        # A copy may get other rules, and needs its own work space.
-        kept = {name: value for name, value in self.__dict__.items() if name != "records"}
+        # A copy may get other rules or bodies, and needs its own work space.
+        own = ("records", "_bodies")
+        kept = {name: value for name, value in self.__dict__.items() if name not in own}
         return kept | {"_idle": []}
 
     @cached_property
@@ -135,25 +141,60 @@ class World(InverseKinematics):
         q = finite_array("configurations", configurations, (None, self.arm.n_joints))
         return self.screened(q)
 
-    def screened(self, q: Array) -> tuple[Array, NDArray[np.bool_]]:
-        """`screen` for finite configurations in a contiguous array."""
-        tools, free, touching, n_proven = self.proven(q)
+    def screened(self, q: Array, scenes: Array | None = None) -> tuple[Array, NDArray[np.bool_]]:
+        """`screen` for finite configurations in a contiguous array, in scenes of `scenes_of`."""
+        tools, free, touching, n_proven = self.proven(q, scenes)
         if n_proven < len(q):
             doubtful = ~(free | touching)
-            touching[doubtful] = self.contact_model.in_contact(q[doubtful])
+            there = self._no_scenes if scenes is None or not len(scenes) else scenes[doubtful]
+            touching[doubtful] = self.contact_model.touching(q[doubtful], there)
         return tools, touching
 
-    def proven(self, q: Array) -> tuple[Array, NDArray[np.bool_], NDArray[np.bool_], int]:
+    def proven(
+        self, q: Array, scenes: Array | None = None
+    ) -> tuple[Array, NDArray[np.bool_], NDArray[np.bool_], int]:
         """Tool points of finite configurations [m], and what kernels prove of these.
 
-        These are: free ones, touching ones, and their number; Coal decides about others.
+        These are: free ones, touching ones, and their number; Coal decides about others. Takes the
+        scenes of `scenes_of`, one for each; without, random bodies are absent.
         """
-        n = len(q)
+        n, scenes = len(q), self._no_scenes if scenes is None else scenes
         tools, free, touching = np.empty((n, 3)), np.empty(n, dtype=bool), np.empty(n, dtype=bool)
         chain, shapes, _ = self.records
-        arrays = (chain, shapes, q, tools, free, touching)
+        arrays = (chain, shapes, q, scenes, tools, free, touching)
         n_proven = run_rows(self._screen_some, n, n, self.threads, *arrays)
         return tools, free, touching, n_proven
+
+    @cached_property
+    def _draws(self) -> SceneDraws:
+        return SceneDraws.of(self.problem.scene)
+
+    @cached_property
+    def _no_scenes(self) -> Array:
+        return np.zeros((0, *self.contact_model.shapes.placed.shape))
+
+    def scenes_of(self, starts: Array, goals: Array) -> Array:
+        """Rows of the bodies of each episode, shape (n, n_placed, 16); empty if all have the same.
+
+        See `kinarm.contact_shapes.ContactShapes.placed`. Takes starts, shape (n, n_joints) [rad or
+        m], and goals, shape (n, 3) [m]; ProblemError if a body finds no place.
+        """
+        if not self.has_random_bodies:
+            return self._no_scenes
+        drawn = self.problem.scene, self._draws, self.arm.chain
+        return drawn_rows(*drawn, starts, goals, self.threads)
+
+    def in_scene(self, start: Array, goal: Array) -> "World":
+        """The world of one episode, whose random bodies stay where they are.
+
+        Takes its start, shape (n_joints,) [rad or m], and its goal, shape (3,) [m].
+        """
+        if not self.has_random_bodies:
+            return self
+        other, scenes = copy(self), self.scenes_of(start[None], goal[None])
+        other.has_random_bodies = False
+        other.contact_model = self.contact_model.fixed(scenes[0])
+        return other
 
     def clearance(self, configurations: ArrayLike) -> Clearance:
         """Measure how far the closest of the tested pairs is apart, and where.
@@ -234,6 +275,7 @@ class World(InverseKinematics):
         """
         n, n_joints = starts.shape
         horizon, n_observations = self.rules.horizon, self.n_observations
+        shapes = self.contact_model.shapes
         return Episodes(
             status=np.zeros(n, dtype=np.int64),
             steps=np.zeros(n, dtype=np.int64),
@@ -243,7 +285,8 @@ class World(InverseKinematics):
             doubt=np.zeros(n, dtype=np.int64),
             touched=np.zeros(n, dtype=np.int64),
             cleared=np.zeros(n, dtype=bool),
-            planes=np.zeros((n, len(self.contact_model.shapes.pairs), PLANE)),
+            planes=np.zeros((n, len(shapes.pairs), PLANE)),
+            scenes=np.zeros((n if self.has_random_bodies else 0, *shapes.placed.shape)),
             goal=goals.copy(),
             observation=np.zeros((n, n_observations)),
             distance=np.zeros(n),

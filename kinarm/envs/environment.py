@@ -224,7 +224,10 @@ class ArmEnvironment(Lifecycle):
         ways = world.substeps(episodes.q[rows], episodes.target[rows])
         for row, way, doubt in zip(rows.tolist(), ways, episodes.doubt[rows].tolist(), strict=True):
             tested = (q for k, q in enumerate(way) if doubt >> k & 1)
-            found = map(world.contact_model.first_in_contact, tested)
+            model = world.contact_model
+            if len(episodes.scenes):
+                model = model.at(episodes.scenes[row])
+            found = map(model.first_in_contact, tested)
             contact[row] = next((index + 1 for index in found if index is not None), 0)
 
     def _make_interface(self, simulator: Simulator, dtype: DTypeLike) -> Interface:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from kinarm.episode_scenes import scene_of_episode
 from kinarm.episodes import COLLISION, SUCCESS, TRUNCATED, Episodes
 from kinarm.errors import InvalidInputError, whole_number
 from kinarm.observation import part_slices
@@ -86,7 +87,8 @@ class EnvPictures:
         self._simulator, self._num_envs = simulator, num_envs
         self._traces = np.empty((num_envs if mode else 0, simulator.task.horizon + 1, 3))
         self._contacts: dict[int, Contact | None] = {}
-        self._renderer: Renderer | None = None
+        self._starts = np.zeros((num_envs, simulator.arm.n_joints))
+        self._renderers: dict[int, Renderer] = {}
         self._stage: LiveStage | None = None
         self._begun: Episodes
 
@@ -96,8 +98,11 @@ class EnvPictures:
             return
         self._begun = episodes
         self._traces[rows, 0] = self._tools(episodes)[rows]
+        self._starts[rows] = episodes.q[rows]
         for row in rows.tolist():
             self._contacts.pop(row, None)
+            if self._simulator.world.has_random_bodies:
+                self._renderers.pop(row, None)
         if self.mode == "human" and 0 in rows:
             self._live_stage().begin(episodes.q[0], episodes.goal[0])
 
@@ -109,9 +114,8 @@ class EnvPictures:
         self._traces[np.arange(self._num_envs), episodes.steps] = self._tools(episodes)
         for row in np.flatnonzero(episodes.status == COLLISION).tolist():
             if row not in self._contacts:
-                self._contacts[row] = self._simulator.world.contact(
-                    episodes.q[row], episodes.target[row]
-                )
+                world = self._simulator.world.in_scene(self._starts[row], episodes.goal[row])
+                self._contacts[row] = world.contact(episodes.q[row], episodes.target[row])
         if self.mode == "human":
             stage = self._live_stage()
             stage.show(episodes.q[0])
@@ -120,31 +124,39 @@ class EnvPictures:
 
     def __getstate__(self) -> dict[str, Any]:
         """Copies have their own renderer and page."""
-        return {**self.__dict__, "_renderer": None, "_stage": None}
+        return {**self.__dict__, "_renderers": {}, "_stage": None}
 
     def close(self) -> None:
         """End the live page."""
         if self._stage is not None:
             self._stage.server.close()
-        self._stage = self._renderer = None
+        self._stage, self._renderers = None, {}
 
     def render(self) -> Pictures | None:
         """A picture of each arm, in the mode for it."""
         if self.mode != "rgb_array":
             return None
-        if self._renderer is None:
-            from kinarm.viewer.renderer import Renderer
-
-            width, height = self._size
-            self._renderer = Renderer(
-                self._simulator.problem, width=width, height=height, camera=self._camera
-            )
         pictures = []
         for row, (q, goal) in enumerate(zip(self._begun.q, self._begun.goal, strict=True)):
             trace, outcome = self._way(row)
-            contact, render = self._contacts.get(row), self._renderer.render
+            contact, render = self._contacts.get(row), self._renderer(row).render
             pictures.append(render(q, goal, trace=trace, outcome=outcome, contact=contact))
         return Pictures(pictures)
+
+    def _renderer(self, row: int) -> "Renderer":
+        """Renderer of an arm's scene, one for all arms if they have the same."""
+        world = self._simulator.world
+        key = row if world.has_random_bodies else 0
+        if key not in self._renderers:
+            from kinarm.viewer.renderer import Renderer
+
+            episode = self._starts[row], self._begun.goal[row]
+            scene = scene_of_episode(world.problem.scene, world.arm, *episode)
+            problem, (width, height) = world.problem.replace(scene=scene), self._size
+            self._renderers[key] = Renderer(
+                problem, width=width, height=height, camera=self._camera
+            )
+        return self._renderers[key]
 
     def _live_stage(self) -> "LiveStage":
         if self._stage is None:

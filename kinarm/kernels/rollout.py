@@ -26,6 +26,7 @@ from kinarm.kernels.session import (
     Session,
     load_episode,
     put,
+    put_scene,
     store_episode,
     take,
     take_number,
@@ -53,6 +54,7 @@ def begin(counters: NDArray[np.int64], session: Session, rows: NDArray[np.int64]
             e = rows[start + min(lane, filled - 1)]
             put(q, e, block.q, 0, lane)
             put(episodes.goal, e, block.goal, 0, lane)
+            put_scene(episodes.scenes, e, lane, block.after)
         forward_kinematics(chain, block.q, 0, block.after)
         free = prove_configurations(shapes, 0, filled, block, alone)
         arm = block.after[: q.shape[1] + 1]

@@ -14,7 +14,7 @@ from kinarm.kernels.compiling import Array, kernel, lean_kernel
 from kinarm.kernels.kinematics import forward_kinematics, to_world
 from kinarm.kernels.lanes import LANES, lane_bits
 from kinarm.kernels.proof import DEPTH, deepest_overlap, prove_configurations
-from kinarm.kernels.session import Alone, Block, put, take
+from kinarm.kernels.session import Alone, Block, put, put_scene, take
 
 
 @kernel
@@ -113,6 +113,7 @@ def screen(
     chain: Chain,
     shapes: ContactShapes,
     configurations: Array,
+    scenes: Array,
     tools: Array,
     free: NDArray[np.bool_],
     touching: NDArray[np.bool_],
@@ -127,6 +128,8 @@ def screen(
         Work space, the arm, and what may touch.
     configurations : ndarray, shape (n, n_joints)
         Joint positions [rad or m].
+    scenes : ndarray, shape (n, n_placed, 16) or (0, n_placed, 16)
+        Rows of each one's bodies, if they differ.
     tools, free, touching : ndarray, shape (n, 3), and of bool, shape (n,)
         Where tool points go [m], and what is proven.
 
@@ -140,7 +143,9 @@ def screen(
     for start in range(first, last, LANES):
         filled = min(last - start, LANES)
         for lane in range(LANES):
-            put(configurations, start + min(lane, filled - 1), block.q, 0, lane)
+            row = start + min(lane, filled - 1)
+            put(configurations, row, block.q, 0, lane)
+            put_scene(scenes, row, lane, block.after)
         forward_kinematics(chain, block.q, 0, block.after)
         touched = lane_bits(deepest_overlap(shapes, block.after) > DEPTH)
         apart = prove_configurations(shapes, touched, filled, block, alone)

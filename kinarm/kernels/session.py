@@ -135,6 +135,16 @@ def take_rows(held: Array, lane: int, rows: Array) -> None:
 
 
 @inlined
+def put_scene(scenes: Array, e: int, lane: int, poses: Array) -> None:
+    """Put the rows of an episode's bodies, if it has its own, into a lane of poses."""
+    if scenes.shape[0] > 0:
+        first = poses.shape[0] - scenes.shape[1]
+        for body in range(scenes.shape[1]):
+            for i in range(POSE):
+                as_numbers(poses)[first + body, i, lane] = scenes[e, body, i]
+
+
+@inlined
 def load_episode(e: int, lane: int, control: Control, episodes: Episodes, block: Block) -> None:
     """Put an episode into a lane; its observation only if needed."""
     put(episodes.q, e, block.q, 0, lane)
@@ -144,6 +154,8 @@ def load_episode(e: int, lane: int, control: Control, episodes: Episodes, block:
         put(episodes.observation, e, block.observation, 0, lane)
     for pair in range(episodes.planes.shape[1]):
         put(episodes.planes[e], pair, block.planes, pair, lane)
+    put_scene(episodes.scenes, e, lane, block.before)
+    put_scene(episodes.scenes, e, lane, block.after)
     if block.weights.shape[1] > 0:
         put(control.weights, control.policy[e], block.weights, 0, lane)
     for power in range(2):

@@ -4,6 +4,7 @@ import struct
 import threading
 from collections import defaultdict
 from collections.abc import Iterator, Mapping
+from dataclasses import replace
 from itertools import count
 from typing import Any
 
@@ -14,6 +15,8 @@ from meshcat.geometry import LineBasicMaterial, Object
 from numpy.typing import NDArray
 
 from kinarm.arm import Arm
+from kinarm.episode_scenes import scene_of_episode
+from kinarm.kernels.compiling import Array
 from kinarm.problem import ReachProblem
 from kinarm.scene import Scene
 from kinarm.viewer.camera import stage_scale
@@ -229,10 +232,24 @@ def draw_surroundings(window: Visualizer, scene: Scene) -> None:
         material = LineBasicMaterial(color=GRID_COLOUR).lower({})
         del material["uuid"]
         _show(window["grid"], "LineSegments", lines, material, np.eye(4))
+    _draw_obstacles(window["obstacles"], scene)
+
+
+def draw_random_bodies(
+    window: Visualizer, scene: Scene, arm: Arm, start: Array, goal: Array
+) -> None:
+    """Draw the random bodies of an episode, from its start [rad or m] and goal [m]."""
+    if scene.random_bodies:
+        window["random"].delete()
+        drawn = scene_of_episode(scene, arm, start, goal).obstacles[len(scene.obstacles) :]
+        _draw_obstacles(window["random"], replace(scene, obstacles=drawn, random_bodies=()))
+
+
+def _draw_obstacles(window: Visualizer, scene: Scene) -> None:
     for number, (body, *slab) in enumerate(obstacle_meshes(scene)):
         if slab:
-            put(window[f"obstacles/{number}/top"], GOAL_SLAB, *slab)
-        put(window[f"obstacles/{number}/body"], OBSTACLE, body)
+            put(window[f"{number}/top"], GOAL_SLAB, *slab)
+        put(window[f"{number}/body"], OBSTACLE, body)
 
 
 def _grid_lines() -> NDArray[np.float64]:

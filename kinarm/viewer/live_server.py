@@ -22,6 +22,7 @@ from kinarm.viewer.drawing import (
     aim_camera,
     draw_arm,
     draw_goal,
+    draw_random_bodies,
     draw_surroundings,
     draw_trace,
 )
@@ -128,6 +129,7 @@ class LiveStage:
 
     def __init__(self, server: LiveServer, problem: ReachProblem, arm: Arm) -> None:
         self.server, self._arm, self._data = server, arm, arm.model.createData()
+        self._scene = problem.scene
         self._due, self._scale = 0.0, stage_scale(arm, problem.scene)
         window = server.window
         draw_surroundings(window, problem.scene)
@@ -141,6 +143,7 @@ class LiveStage:
         place[:3, 3] = goal
         self.server.window["goal"].set_transform(place)
         self.server.window["trace"].delete()
+        draw_random_bodies(self.server.window, self._scene, self._arm, configuration, place[:3, 3])
         self.show(configuration)
 
     def show(self, configuration: NDArray[np.float64]) -> None:

@@ -28,7 +28,15 @@ from kinarm.problem import ProblemLike
 from kinarm.recording import Recording, record_path
 from kinarm.scene import Scene
 from kinarm.viewer.camera import stage_scale
-from kinarm.viewer.drawing import SHAPE, DrawnScene, draw_goal, draw_stage, draw_trace, put
+from kinarm.viewer.drawing import (
+    SHAPE,
+    DrawnScene,
+    draw_goal,
+    draw_random_bodies,
+    draw_stage,
+    draw_trace,
+    put,
+)
 from kinarm.viewer.parts import OUTCOME_COLOURS, TRACE_SIDES
 from kinarm.viewer.visual_shapes import arm_parts, collision_parts, link_joints
 from kinarm.world import World
@@ -241,6 +249,8 @@ def _replay_html(
     draw_stage(drawn.window, arm, scene)
     draw_goal(drawn.window["goal"], problem)
     for number, runs in enumerate(trials):
+        episode = runs[0].states[0], runs[0].goal
+        draw_random_bodies(drawn.window[f"trials/{number}"], scene, arm, *episode)
         for name, run in zip(("run", "ghost"), runs, strict=False):
             points = np.array([arm.tool_position(state) for state in run.states])
             way = drawn.window[f"trials/{number}/{name}"]

@@ -20,7 +20,7 @@ from numpy.typing import ArrayLike, NDArray
 from kinarm._fields import read_toml
 from kinarm._files import cached_arrays, first_line
 from kinarm.arm import Arm
-from kinarm.collision import body_names
+from kinarm.contact_pairs import body_names
 from kinarm.errors import ArmError, KinarmError, MissingExtraError
 from kinarm.meshes import mesh_content
 from kinarm.urdf_tree import FARTHEST, check_numbers

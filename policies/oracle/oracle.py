@@ -17,6 +17,7 @@ the fastest, and finding none proves nothing.
 """
 
 from collections.abc import Callable, Iterator
+from copy import copy
 from dataclasses import dataclass, fields
 
 import numpy as np
@@ -100,7 +101,7 @@ class Oracle:
         parts = []
         for first in range(0, max(len(q), 1), LOT):
             lot = slice(first, first + LOT)
-            parts.append(self._solve_lot(q[lot], g[lot]))
+            parts += self._solve_lots(q[lot], g[lot])
             if on_progress is not None:
                 on_progress(min(first + LOT, len(q)), len(q))
         return OracleSolutions.concatenated(parts)
@@ -152,6 +153,18 @@ class Oracle:
         g = np.tile(g, (len(q) if one_goal else 1, 1))
         episodes = self.simulator.reset(q, g)
         return episodes.q, episodes.goal
+
+    def _solve_lots(self, starts: Array, goals: Array) -> "list[OracleSolutions]":
+        """Solve trials together, or each in its own scene."""
+        if not self.simulator.world.has_random_bodies:
+            return [self._solve_lot(starts, goals)]
+        found = []
+        for row in range(len(starts)):
+            alone = copy(self)
+            alone.simulator = self.simulator.in_scene(starts[row], goals[row])
+            alone._prover = Prover(alone.simulator)
+            found.append(alone._solve_lot(starts[row : row + 1], goals[row : row + 1]))
+        return found
 
     def _solve_lot(self, starts: Array, goals: Array) -> "OracleSolutions":
         """Bounds, motions and their replay."""

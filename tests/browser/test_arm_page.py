@@ -6,7 +6,8 @@ import pinocchio as pin
 import pytest
 
 from kinarm.arm import Arm
-from kinarm.collision import ContactModel, make_verdicts_reliable
+from kinarm.collision import ContactModel
+from kinarm.contact_pairs import make_verdicts_reliable
 from kinarm.scene import Obstacle, Scene
 from kinarm.viewer import arm_page
 

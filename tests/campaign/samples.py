@@ -14,7 +14,7 @@ from kinarm.evaluation import EvaluationRequest, Study, TrialSet
 from kinarm.policies import Oracle, load_policy, recipe, save_checkpoint
 from kinarm.policies.learners import training_states
 from kinarm.recording import record_rollouts, save_recordings
-from tests.conftest import CUBE_CORNERS, CUBE_FACES, write_obj, write_stl
+from tests.helpers.mesh_files import CUBE_CORNERS, CUBE_FACES, write_obj, write_stl
 
 CUBE = 0.1 * CUBE_CORNERS
 

@@ -22,7 +22,8 @@ def assert_equal_outcome(simulator, rollouts, i, episode, atol=1e-12):
     np.testing.assert_allclose(rollouts.returns[i], episode.rewards.sum(), rtol=0, atol=atol)
     np.testing.assert_array_equal(rollouts.configurations[i], rollouts.paths[i, steps])
     if episode.collision:
-        pair = simulator.world.contact_pair(rollouts.configurations[i], rollouts.targets[i])
+        there = simulator.world.in_scene(rollouts.starts[i], rollouts.goals[i])
+        pair = there.contact_pair(rollouts.configurations[i], rollouts.targets[i])
         assert pair == episode.contact
 
 

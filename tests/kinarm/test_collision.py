@@ -7,7 +7,8 @@ from configurations import contact_boundary, depths, jittered, random_configurat
 from simulators import changed
 
 from kinarm.arm import Arm
-from kinarm.collision import ContactModel, make_verdicts_reliable, start_anew
+from kinarm.collision import ContactModel
+from kinarm.contact_pairs import make_verdicts_reliable, start_anew
 from kinarm.contact_shapes import WITH_HALFSPACE
 from kinarm.episodes import COLLISION, PAUSED, Control
 from kinarm.kernels.rollout import advance

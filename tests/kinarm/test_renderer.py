@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from kinarm.arm import Arm
-from kinarm.collision import Contact, body_names
+from kinarm.collision import Contact
+from kinarm.contact_pairs import body_names
 from kinarm.errors import InvalidInputError
 from kinarm.problem import ReachProblem
 from kinarm.viewer import Camera, Renderer

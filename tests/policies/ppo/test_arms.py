@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from kinarm.bodies import RandomBodies
 from kinarm.envs import ReachEnv
 from kinarm.failed_scenarios import FailedScenarios
 from kinarm.policies import Normalizer, PPOConfig, PPOState
@@ -26,9 +27,10 @@ def normalizer():
     return Normalizer.of(simulator.world.observe(*simulator.sample(np.random.default_rng(1), 500)))
 
 
-def made(*, number=NUMBER, horizon=64, tolerance=0.5, **settings):
+def made(*, number=NUMBER, horizon=64, tolerance=0.5, scene=None, **settings):
     """Arms that have not begun."""
-    problem = PROBLEMS["both"].replace(reward=REWARD, tolerance=tolerance, horizon=horizon)
+    changes = {"tolerance": tolerance, "horizon": horizon, "scene": scene}
+    problem = PROBLEMS["both"].replace(reward=REWARD, **changes)
     config = PPOConfig(problem=problem, n_envs=number, n_steps=100, batch_size=20, **settings)
     return TrainingArms(config)
 
@@ -55,6 +57,20 @@ def begun(normalizer):
 def go_on(arms, state):
     """The state in which the arms are now."""
     return replace(state, episodes=arms.states(), failed=arms.failed)
+
+
+def test_random_bodies_stay_where_a_training_goes_on(begun):
+    ball = {"name": "ball", "shape": "sphere", "smallest": (0.05,), "largest": (0.1,)}
+    there = RandomBodies(lower=(-0.5, -0.5, 0.2), upper=(0.5, 0.5, 0.7), **ball)
+    scene = replace(PROBLEMS["both"].scene, random_bodies=(there,))
+    arms, state = begun(number=64, scene=scene)
+    rng = np.random.default_rng(1)
+    for _ in range(20):
+        arms.step(rng.uniform(-1, 1, (64, 5)).astype(np.float32))
+    again = made(number=64, scene=scene)
+    again.restore(go_on(arms, state), rng)
+    np.testing.assert_array_equal(again.episodes.scenes, arms.episodes.scenes)
+    assert len(np.unique(arms.episodes.scenes[:, 2, 13])) == 64
 
 
 def begin_single(arms, row):

@@ -1,0 +1,158 @@
+"""Which pairs of shapes are tested for contact, and how Coal is asked about them."""
+
+import warnings
+from collections import Counter
+from collections.abc import Iterable
+from itertools import combinations, product
+
+import coal
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+
+from kinarm.arm import Arm
+from kinarm.errors import ProblemError
+
+CLOSE, OFTEN, CLOSENESS_SAMPLES = 0.025, 0.1, 200
+"""Close pairs are nearer than this [m] in more than this share of these samples."""
+
+GUESS, HINT = np.array([1.0, 0.0, 0.0]), np.zeros(2, dtype=np.int32)
+"""Starts of Coal's searches: direction between shapes, and numbers of corners."""
+
+TOUCH_AT_HOME = "touch at home"
+"""Why a pair of an arm is never tested."""
+
+MOUNT_SAMPLES = 721
+"""Positions of the first joint that test the mounting."""
+
+
+def make_verdicts_reliable(data: pin.GeometryData) -> pin.GeometryData:
+    """Make Coal's verdicts reliable and a function of the configuration alone; return the data.
+
+    By default Coal starts where its last call on the same pair ended, and verdicts within its
+    tolerance of 1e-6 m depend on that. A guess in the request, which `start_anew` puts back,
+    replaces it. Without a description of the contact, Coal may stop at a distance of some 1e-7 m
+    and call bodies apart that are centimetres deep in each other, once in some 100 000 times.
+    """
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", DeprecationWarning)
+        for request in data.collisionRequests:
+            request.enable_cached_gjk_guess = False
+            request.gjk_initial_guess = coal.GJKInitialGuess.CachedGuess
+            request.enable_contact = True
+    return data
+
+
+def start_anew(requests: Iterable[coal.CollisionRequest]) -> None:
+    """Let Coal's next searches start where all do."""
+    for request in requests:
+        request.cached_gjk_guess, request.cached_support_func_guess = GUESS, HINT
+
+
+def link_of(shape: pin.GeometryObject) -> str:
+    """Link of a collision shape."""
+    return str(shape.name.rsplit("_", 1)[0])
+
+
+def body_names(arm: Arm) -> tuple[str, ...]:
+    """Links of the collision shapes, numbered only where a link has several."""
+    shapes = list(arm.geometry.geometryObjects)
+    count = Counter(map(link_of, shapes))
+    return tuple(link_of(shape) if count[link_of(shape)] == 1 else shape.name for shape in shapes)
+
+
+def are_neighbours(arm: Arm, first: pin.GeometryObject, second: pin.GeometryObject) -> bool:
+    """Whether a joint joins the links of two shapes; held bodies have no neighbours."""
+    held = {body.name for body in arm.held_bodies}
+    apart = abs(first.parentJoint - second.parentJoint)
+    return apart == 1 and not held & {link_of(first), link_of(second)}
+
+
+def candidate_pairs(arm: Arm, geometry: pin.GeometryModel, n_shapes: int) -> list[tuple[int, int]]:
+    """All pairs that move against each other, but those that are allowed."""
+    shapes = list(geometry.geometryObjects)
+    parent, links = [shape.parentJoint for shape in shapes], list(map(link_of, shapes))
+    allowed = {frozenset(contact.links) for contact in arm.allowed_contacts}
+    pairs = []
+    for first, second in combinations(range(n_shapes), 2):
+        alike = parent[first] == parent[second] or {links[first], links[second]} in allowed
+        if not alike and not are_neighbours(arm, shapes[first], shapes[second]):
+            pairs.append((first, second) if parent[first] < parent[second] else (second, first))
+    moving = [shape for shape in range(n_shapes) if parent[shape] > 0]
+    flat = [isinstance(each.geometry, coal.Halfspace) for each in shapes]
+    with_world = product(moving, range(n_shapes, geometry.ngeoms))
+    # Kind after kind, which the kernels find easier to predict.
+    return pairs + sorted(with_world, key=lambda pair: flat[pair[1]])
+
+
+def uninformative_pairs(
+    arm: Arm,
+    geometry: pin.GeometryModel,
+    n_shapes: int,
+    names: tuple[str, ...],
+    random: range,
+) -> dict[int, str]:
+    """Pairs within the arm that touch at home, and of the mounting, with reasons.
+
+    The mounting is the first link against the world, where it touches never, or the ground always,
+    at 721 positions along the range of the first joint. Random bodies may be anywhere.
+    """
+    data, geometry_data = arm.model.createData(), make_verdicts_reliable(geometry.createData())
+    pairs, objects = list(geometry.collisionPairs), geometry.geometryObjects
+
+    def touching(q: NDArray[np.float64], chosen: Iterable[int]) -> set[int]:
+        """Indices of chosen pairs in contact at a configuration."""
+        pin.updateGeometryPlacements(arm.model, data, geometry, geometry_data, q)
+        start_anew(geometry_data.collisionRequests[index] for index in chosen)
+        return {index for index in chosen if pin.computeCollision(geometry, geometry_data, index)}
+
+    within = [index for index, pair in enumerate(pairs) if pair.second < n_shapes]
+    resting = touching(arm.home, within)
+    mounting = {
+        index
+        for index, pair in enumerate(pairs)
+        if pair.second >= n_shapes and pair.second not in random
+        if objects[pair.first].parentJoint == 1
+    }
+    always, never = set(mounting), set(mounting)
+    q = arm.home.copy()
+    for position in np.linspace(arm.lower[0], arm.upper[0], MOUNT_SAMPLES if mounting else 0):
+        q[0] = position
+        now = touching(q, mounting)
+        always &= now
+        never -= now
+    for index in sorted(always):
+        if not isinstance(objects[pairs[index].second].geometry, coal.Halfspace):
+            raise ProblemError(
+                f"arm {arm.name!r} cannot move: {names[pairs[index].first]} touches "
+                f"{names[pairs[index].second]} wherever the first joint is"
+            )
+    return {
+        **dict.fromkeys(resting, TOUCH_AT_HOME),
+        **dict.fromkeys(always, "the mounting: always touch"),
+        **dict.fromkeys(never, "never touch, wherever the first joint is"),
+    }
+
+
+def close_pairs(arm: Arm, geometry: pin.GeometryModel) -> set[int]:
+    """Pairs with a mesh that often are less than `CLOSE` apart."""
+    objects = geometry.geometryObjects
+    meshes = [isinstance(shape.geometry, coal.ConvexBase) for shape in objects]
+    pairs = [
+        index
+        for index, pair in enumerate(geometry.collisionPairs)
+        if meshes[pair.first] or meshes[pair.second]
+    ]
+    if not pairs:
+        return set()
+    data, distances = arm.model.createData(), geometry.createData()
+    rng, often = np.random.default_rng(0), dict.fromkeys(pairs, 0)
+    for _ in range(CLOSENESS_SAMPLES):
+        q = arm.home.copy()
+        moved = slice(arm.n_actuated)
+        q[moved] = rng.uniform(arm.lower[moved], arm.upper[moved])
+        pin.updateGeometryPlacements(arm.model, data, geometry, distances, q)
+        for index in pairs:
+            result = pin.computeDistance(geometry, distances, index)
+            often[index] += result.min_distance < CLOSE
+    return {index for index in pairs if often[index] > OFTEN * CLOSENESS_SAMPLES}

@@ -1,0 +1,83 @@
+"""The bodies of episodes in scenes with random ones."""
+
+from dataclasses import replace
+
+import numpy as np
+import pinocchio as pin
+
+from kinarm._parallel import run_rows
+from kinarm.arm import Arm
+from kinarm.bodies import PARKED, Body
+from kinarm.chain import Chain
+from kinarm.errors import ProblemError
+from kinarm.kernels.compiling import Array
+from kinarm.kernels.placing import ATTEMPTS, draw_scenes
+from kinarm.scene import Scene
+from kinarm.scene_draws import SceneDraws
+
+
+def drawn_rows(
+    scene: Scene, draws: SceneDraws, chain: Chain, starts: Array, goals: Array, threads: int
+) -> Array:
+    """Rows of all bodies in ``poses``, for each episode, shape (n, n_placed, 16).
+
+    Parameters
+    ----------
+    scene, draws, chain
+        Scene with random bodies, how they are drawn, and the arm.
+    starts, goals : ndarray, shape (n, n_joints) and (n, 3)
+        Starts [rad or m] and goals [m].
+    threads : int
+        Threads at most.
+
+    Raises
+    ------
+    ProblemError
+        If there is no place for a body.
+    """
+    n = len(starts)
+    scenes, failed = np.empty((n, *draws.placed.shape)), np.empty(n, dtype=np.int64)
+    bits = (np.concatenate([goals, starts], axis=1) + 0.0).view(np.uint64)
+    run_rows(draw_scenes, n, n, threads, chain, draws, starts, goals, bits, scenes, failed)
+    if failed.any():
+        name = scene.random_bodies[int(failed.max()) - 1].name
+        raise ProblemError(
+            f"no place clear of the goal found for one of random bodies {name!r} in {ATTEMPTS} "
+            f"draws, in {np.count_nonzero(failed)} of {n} scenes"
+        )
+    return scenes
+
+
+def scene_of_episode(scene: Scene, arm: Arm, start: Array, goal: Array) -> Scene:
+    """The scene of an episode, its random bodies among the obstacles.
+
+    Parameters
+    ----------
+    scene, arm : Scene and Arm
+        The scene, and the arm where it stands.
+    start, goal : ndarray, shape (n_joints,) and (3,)
+        Where the episode starts [rad or m], and its goal [m].
+    """
+    if not scene.random_bodies:
+        return scene
+    draws = SceneDraws.of(scene)
+    (rows,) = drawn_rows(scene, draws, arm.chain, start[None], goal[None], threads=1)
+    fixed = len(scene.obstacles)
+    slots = [body for each in scene.random_bodies for body in each.slots]
+    placed = zip(slots, rows[fixed : fixed + len(slots)], strict=True)
+    bodies = [_moved(body, row) for body, row in placed if row[15] != PARKED[2]]
+    return replace(scene, obstacles=(*scene.obstacles, *bodies), random_bodies=())
+
+
+def _moved(body: Body, row: Array) -> Body:
+    """A body with the size and the pose of a row."""
+    x, y, z, radius = row[:4].tolist()
+    size = {
+        "box": (2 * x, 2 * y, 2 * z),
+        "sphere": (radius,),
+        "capsule": (radius, 2 * z),
+        "cylinder": (x, 2 * z),
+        "mesh": (),
+    }[body.shape]
+    turn, (x, y, z) = pin.Quaternion(row[4:13].reshape(3, 3)).coeffs().tolist(), row[13:].tolist()
+    return replace(body, size=size, position=(x, y, z), quaternion=(turn[3], *turn[:3]))
