@@ -18,7 +18,7 @@ from kinarm import PROBLEMS, REWARD_TERMS, Arm, RewardWeights, Scene, Simulator
 from kinarm.__main__ import COMMANDS
 from kinarm._fields import summary_of
 from kinarm.contact_pairs import link_of
-from kinarm.enclosures import enclosing_capsule
+from kinarm.enclosures import inner_capsule
 from kinarm.envs import ENVIRONMENTS
 from kinarm.evaluation import METRICS
 from kinarm.evaluation.commands import arms, problem
@@ -71,7 +71,7 @@ def capsule_table(name: str) -> str:
     """Collision shapes of an arm."""
     rows = []
     for shape in Arm.load(name).geometry.geometryObjects:
-        (start, end), radius = enclosing_capsule(shape)
+        (start, end), radius = inner_capsule(shape)
         frame = f"joint {shape.parentJoint}" if shape.parentJoint else "world"
         link = link_of(shape).replace("_", " ")
         rows.append([link, frame, numbers(start), numbers(end), f"{radius:.3f}"])

@@ -18,7 +18,6 @@ from kinarm.enclosures import (
     SOME,
     Enclosure,
     around,
-    enclosing_capsule,
     enclosing_polytope,
     inner_capsule,
     prism,
@@ -49,11 +48,9 @@ class ContactShapes(NamedTuple):
     Attributes
     ----------
     capsules : ndarray, shape (n_shapes, 7)
-        Capsule that is or encloses a shape: end points (3 + 3) in its frame,
-        radius [m]. For the scene's bodies, before the size.
-    inner : ndarray, shape (n_shapes, 7)
-        Capsule that is or lies in a shape. For the scene's bodies the same axis,
-        and a radius of minus infinity where nothing in them is known.
+        Capsule that is or lies in a shape: end points (3 + 3) in its frame,
+        radius [m]. For the scene's bodies before the size, and with a radius of
+        minus infinity unless they are exact.
     pairs : ndarray of int, shape (n_pairs, 3)
         Kind, index of a moving shape of the arm, and index of the other shape.
     travel : ndarray, shape (n_actuated, n_pairs)
@@ -83,7 +80,6 @@ class ContactShapes(NamedTuple):
     """
 
     capsules: Array
-    inner: Array
     pairs: NDArray[np.int64]
     travel: Array
     exact: NDArray[np.bool_]
@@ -141,15 +137,12 @@ class ContactShapes(NamedTuple):
                 # The fine polytope has all corners of the coarse one.
                 corners = bodies[finer[mover]].corners
                 travel[axis, column] = point_speed(arm.chain, axis, links[mover], corners)
-        capsules = [np.append(*enclosing_capsule(each)) for each in objects]
-        capsules += [np.array(AXIS)] * len(surroundings)
-        inner = [np.append(*inner_capsule(each)) for each in objects]
-        inner += [np.append(AXIS[:6], 0.0 if each.exact else -np.inf) for each in surroundings]
+        capsules = [np.append(*inner_capsule(each)) for each in objects]
+        capsules += [np.append(AXIS, 0.0 if each.exact else -np.inf) for each in surroundings]
         exact = [isinstance(each.geometry, EXACT) for each in objects]
         exact += [each.exact for each in surroundings]
         return cls(
             capsules=np.array(capsules, dtype=np.float64).reshape(-1, 7),
-            inner=np.array(inner, dtype=np.float64).reshape(-1, 7),
             pairs=np.array(rows, dtype=np.int64).reshape(-1, 3),
             travel=travel,
             exact=np.array(exact, dtype=bool),
@@ -166,7 +159,7 @@ class ContactShapes(NamedTuple):
         )
 
 
-AXIS = (0.0, 0.0, -1.0, 0.0, 0.0, 1.0, 0.0)
+AXIS = (0.0, 0.0, -1.0, 0.0, 0.0, 1.0)
 """Axis of a capsule of the scene, before its size."""
 
 

@@ -98,29 +98,6 @@ def _fitted(points: Array, most: int) -> dict[str, Any]:
         chosen.append(farthest)
 
 
-def enclosing_capsule(shape: pin.GeometryObject) -> Enclosure:
-    """Capsule around a shape in its joint's frame; equal to a capsule or sphere."""
-    corners, radius = core(shape)
-    few = len(corners) <= 2
-    local = Enclosure(corners[[0, -1]], radius) if few else _capsule_around(corners)
-    return local.moved(shape.placement)
-
-
-def _capsule_around(points: Array) -> Enclosure:
-    """Capsule along the main direction of points, shape (n, 3)."""
-    centre = (points.min(axis=0) + points.max(axis=0)) / 2
-    _, _, directions = np.linalg.svd(points - centre, full_matrices=False)
-    direction = directions[0]
-    along = (points - centre) @ direction
-    across = np.linalg.norm(points - centre - along[:, None] * direction, axis=1)
-    radius = float(across.max()) * (1 + 1e-9)
-    cap = np.sqrt(np.maximum(radius**2 - across**2, 0.0))
-    low, high = float((along + cap).min()), float((along - cap).max())
-    if low > high:
-        low = high = (low + high) / 2
-    return Enclosure(np.array([centre + low * direction, centre + high * direction]), radius)
-
-
 def inner_capsule(shape: pin.GeometryObject) -> Enclosure:
     """Capsule in a shape, in its joint's frame; equal to a capsule or sphere."""
     corners, radius = core(shape)

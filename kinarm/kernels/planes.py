@@ -51,11 +51,9 @@ def is_placed(shapes: ContactShapes, frame: int, poses: Array) -> bool:
 
 
 @inlined
-def axis_in_world(
-    shapes: ContactShapes, capsules: Array, body: int, poses: Array
-) -> tuple[Vector, Vector]:
-    """End points of the axis of a body's capsule, of those about or in shapes, in the world [m]."""
-    link, axis = shapes.bodies[body, 2], capsules[body]
+def axis_in_world(shapes: ContactShapes, body: int, poses: Array) -> tuple[Vector, Vector]:
+    """End points of the axis of a body's capsule in the world [m]."""
+    link, axis = shapes.bodies[body, 2], shapes.capsules[body]
     if is_placed(shapes, link, poses):
         half = poses[link, 2]
         return to_world(poses, link, 0.0, 0.0, -half), to_world(poses, link, 0.0, 0.0, half)
@@ -112,9 +110,9 @@ def propose(shapes: ContactShapes, pair: int, poses: Array, plane: Array, row: i
         x, y, z, offset = surface(poses, frame)
         plane[row, 0], plane[row, 1], plane[row, 2], plane[row, OFFSET] = x, y, z, offset
         return
-    a, b = axis_in_world(shapes, shapes.capsules, mover, poses)
+    a, b = axis_in_world(shapes, mover, poses)
     if kind == BETWEEN_CAPSULES:
-        c, d = axis_in_world(shapes, shapes.capsules, carrier, poses)
+        c, d = axis_in_world(shapes, carrier, poses)
         x, y, z = between_segments(a, b, c, d)
         x, y, z = rotated_back(poses, frame, x, y, z)
     else:

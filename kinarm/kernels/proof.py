@@ -257,10 +257,10 @@ def is_exact(shapes: ContactShapes, pair: int) -> bool:
 
 
 @inlined
-def radius_of(shapes: ContactShapes, capsules: Array, body: int, poses: Array) -> float:
-    """Radius of a body's capsule, of those about or in shapes [m]."""
+def radius_of(shapes: ContactShapes, body: int, poses: Array) -> float:
+    """Radius of a body's capsule [m]; minus infinity if nothing in the body is known."""
     frame = shapes.bodies[body, 2]
-    radius = 0.0 * poses[0, 13] + capsules[body, 6]
+    radius = 0.0 * poses[0, 13] + shapes.capsules[body, 6]
     if is_placed(shapes, frame, poses):
         radius += poses[frame, 3]
     return radius
@@ -270,15 +270,15 @@ def radius_of(shapes: ContactShapes, capsules: Array, body: int, poses: Array) -
 def overlap(shapes: ContactShapes, pair: int, poses: Array) -> float:
     """Lower bound of a pair's overlap, by what lies in its shapes [m]; negative if apart."""
     kind, first, second = shapes.pairs[pair, 0], shapes.pairs[pair, 1], shapes.pairs[pair, 2]
-    a, b = axis_in_world(shapes, shapes.inner, first, poses)
-    radius = shapes.inner[first, 6] + radius_of(shapes, shapes.inner, second, poses)
+    a, b = axis_in_world(shapes, first, poses)
+    radius = shapes.capsules[first, 6] + radius_of(shapes, second, poses)
     frame = shapes.bodies[second, 2]
     if kind == WITH_HALFSPACE:
         x, y, z, offset = surface(poses, frame)
         start, end = x * a[0] + y * a[1] + z * a[2], x * b[0] + y * b[1] + z * b[2]
         return radius - (min(start, end) - offset)
     if kind == BETWEEN_CAPSULES:
-        c, d = axis_in_world(shapes, shapes.inner, second, poses)
+        c, d = axis_in_world(shapes, second, poses)
         x, y, z = between_segments(a, b, c, d)
     else:
         hx, hy, hz = poses[frame, 0], poses[frame, 1], poses[frame, 2]

@@ -12,7 +12,6 @@ from kinarm.enclosures import (
     MANY,
     SOME,
     Enclosure,
-    enclosing_capsule,
     enclosing_polytope,
     inner_capsule,
 )
@@ -94,63 +93,7 @@ def test_encloses_every_vertex_of_a_hull(most, count):
         assert found.fun <= enclosure.rounding + 1e-9
 
 
-def surface_points(geometry, rng, count):
-    """Points of a shape's surface, in its own frame."""
-    directions = rng.normal(size=(count, 3))
-    directions /= np.linalg.norm(directions, axis=1, keepdims=True)
-    if isinstance(geometry, coal.Sphere):
-        return geometry.radius * directions
-    if isinstance(geometry, coal.Box):
-        corners = rng.choice([-1.0, 1.0], size=(count, 3))
-        return corners * geometry.halfSide
-    along = rng.choice([-1.0, 1.0], size=(count, 1)) * [[0, 0, geometry.halfLength]]
-    if isinstance(geometry, coal.Capsule):
-        return geometry.radius * directions + along
-    flat = directions * [1, 1, 0]
-    return geometry.radius * flat / np.linalg.norm(flat, axis=1, keepdims=True) + along
-
-
-def distance_from_segment(points, capsule):
-    start, end = capsule.corners
-    along = end - start
-    t = (points - start) @ along / max(along @ along, 1e-300)
-    nearest = start + np.clip(t, 0, 1)[:, None] * along
-    return np.linalg.norm(points - nearest, axis=1)
-
-
-class TestEnclosingCapsule:
-    @pytest.mark.parametrize(
-        "geometry",
-        [
-            coal.Sphere(0.1),
-            coal.Capsule(0.1, 0.5),
-            coal.Cylinder(0.1, 0.5),
-            coal.Box(0.1, 0.2, 0.7),
-            coal.Box(0.5, 0.5, 0.01),
-        ],
-        ids=lambda geometry: type(geometry).__name__,
-    )
-    def test_encloses_the_surface(self, geometry):
-        pin.seed(0)
-        for seed in range(5):
-            shape = pin.GeometryObject("shape", 1, pin.SE3.Random(), geometry)
-            points = surface_points(geometry, np.random.default_rng(seed), 2000)
-            world = points @ shape.placement.rotation.T + shape.placement.translation
-            capsule = enclosing_capsule(shape)
-            assert (distance_from_segment(world, capsule) <= capsule.rounding + 1e-12).all()
-
-    def test_encloses_random_hulls_without_waste(self):
-        rng = np.random.default_rng(0)
-        for _ in range(30):
-            points = rng.normal(size=(40, 3)) * rng.uniform(0.01, 1, 3)
-            shape = pin.GeometryObject("hull", 1, pin.SE3.Identity(), hull(points))
-            capsule = enclosing_capsule(shape)
-            distances = distance_from_segment(points, capsule)
-            assert distances.max() <= capsule.rounding + 1e-9
-            assert capsule.rounding <= np.ptp(points, axis=0).max()
-
-
-@pytest.mark.parametrize("enclosing", [enclosing_capsule, enclosing_polytope])
+@pytest.mark.parametrize("enclosing", [inner_capsule, enclosing_polytope])
 def test_other_shapes_are_refused(enclosing):
     shape = pin.GeometryObject("cone_0", 1, pin.SE3.Identity(), coal.Cone(0.1, 0.2))
     with pytest.raises(ArmError, match="'cone_0' is a Cone: not supported"):

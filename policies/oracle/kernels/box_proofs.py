@@ -245,7 +245,7 @@ def deepest_share(a: Vector, b: Vector, lower: Vector, upper: Vector) -> float:
 @inlined
 def axis_of(shapes: ContactShapes, i: int, poses: Array) -> tuple[Vector, Vector, float]:
     """End points of a capsule's axis in the world, and half its length."""
-    a, b = axis_in_world(shapes, shapes.capsules, i, poses)
+    a, b = axis_in_world(shapes, i, poses)
     x, y, z = b[0] - a[0], b[1] - a[1], b[2] - a[2]
     return a, b, 0.5 * math.sqrt(x * x + y * y + z * z)
 
@@ -278,7 +278,7 @@ def overlaps(
         radius = shapes.capsules[i, 6] - DEPTH
         if kind == BETWEEN_CAPSULES:
             c, d, beyond = axis_of(shapes, j, poses)
-            other, radius = along(c, d, 0.5), radius + radius_of(shapes, shapes.capsules, j, poses)
+            other, radius = along(c, d, 0.5), radius + radius_of(shapes, j, poses)
             x, y, z = middle[0] - other[0], middle[1] - other[1], middle[2] - other[2]
             # Most pairs are far apart at the centre.
             reach += beyond + radius
