@@ -213,19 +213,19 @@ def prove_configuration(
     lane: int, shapes: ContactShapes, poses: Array, block: Block, alone: Alone
 ) -> bool:
     """Prove an episode's configuration free as far as first planes have not."""
-    plane, planes, free = alone.plane, as_numbers(block.planes), True
+    plane, planes = alone.plane, as_numbers(block.planes)
     take_rows(poses, lane, alone.after)
     for pair in range(shapes.planes.shape[0]):
         if is_apart(planes[pair, GAP, lane]):
             continue
         if shapes.pairs[pair, 0] == WITH_HALFSPACE:
-            free = False
-            continue
+            return False
         take(block.planes, pair, lane, plane, 0)
         height = separate(shapes, pair, alone.after, alone.relative, alone.simplex, plane)
         put(plane, 0, block.planes, pair, lane)
-        free = free and is_apart(height)
-    return free
+        if not is_apart(height):
+            return False
+    return True
 
 
 @inlined
