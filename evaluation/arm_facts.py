@@ -23,16 +23,16 @@ def joint_speeds(arm: Arm) -> str:
 
 
 def untested_pairs(contact: ContactModel) -> Iterator[tuple[str, str, str]]:
-    """Pairs of bodies that are not tested, and why."""
-    shapes = list(zip(contact.arm.geometry.geometryObjects, contact.body_names, strict=False))
+    """Pairs of links, then of bodies, that are not tested, and why."""
+    reasons: dict[tuple[str, str], str] = {}
     allowed = {frozenset(each.links): each.reason for each in contact.arm.allowed_contacts}
-    for (first, one), (second, other) in combinations(shapes, 2):
-        links = frozenset(map(link_of, (first, second)))
+    for first, second in combinations(contact.arm.geometry.geometryObjects, 2):
+        pair = link_of(first), link_of(second)
         if are_neighbours(contact.arm, first, second):
-            yield one, other, "neighbours"
-        elif first.parentJoint != second.parentJoint and links in allowed:
-            yield one, other, f"allowed: {allowed[links]}"
-    for (one, other), reason in contact.left_out.items():
+            reasons[pair] = "neighbours"
+        elif first.parentJoint != second.parentJoint and frozenset(pair) in allowed:
+            reasons[pair] = f"allowed: {allowed[frozenset(pair)]}"
+    for (one, other), reason in (reasons | contact.left_out).items():
         yield one, other, reason
 
 
