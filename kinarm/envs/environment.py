@@ -198,9 +198,9 @@ class ArmEnvironment(Lifecycle):
             q, goals = self._episodes.q, self._episodes.goal
         fixed = fixed_scenario(options, self.simulator, self._n_arms)
         if "start" in fixed:  # refuse those in contact, before anything changes
-            starts = q.copy()
-            starts[rows] = fixed["start"][rows]
-            self.simulator.reset(starts, goals)
+            starts, ends = q.copy(), goals.copy()
+            starts[rows], ends[rows] = fixed["start"][rows], fixed.get("goal", goals)[rows]
+            self.simulator.reset(starts, ends)
         self._queues.put(rows, q, goals)
         for array, name in ((q, "start"), (goals, "goal")):
             if name in fixed:
@@ -257,7 +257,8 @@ def fixed_scenario(
     ----------
     options : mapping, optional
         ``start``, shape (n_joints,) or (n, n_joints) [rad or m], and ``goal``,
-        shape (3,) or (n, 3) [m]: one for all arms, or one for each.
+        shape (3,) or (n, 3) [m]: one for all arms, or one for each. In a scene
+        with random bodies, both.
     simulator, n : Simulator and int
         Where, and the number of arms.
 
@@ -266,9 +267,11 @@ def fixed_scenario(
     dict
         The same, one row an arm.
     """
-    arm, fixed = simulator.arm, {}
+    arm, fixed, given = simulator.arm, {}, options or {}
     widths = {"start": arm.n_joints, "goal": 3}
-    for name, value in (options or {}).items():
+    if len(given) == 1 and simulator.world.has_random_bodies:
+        raise InvalidInputError("start and goal decide where random bodies are: set both")
+    for name, value in given.items():
         if name not in widths:
             raise UnknownNameError("reset option", name, widths)
         array, one = one_or_many(name, value, (widths[name],))

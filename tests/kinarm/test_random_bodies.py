@@ -1,5 +1,6 @@
 """Scenes that differ from episode to episode."""
 
+import gymnasium
 import numpy as np
 import pytest
 from configurations import random_configurations
@@ -201,6 +202,20 @@ class TestEpisodes:
         recordings = record_rollouts(changing, rollouts, "random", numbers)
         assert [each.contact for each in recordings] == [pairs[i] for i in numbers]
         assert "kinarm replay" in str(replay_page(recordings).html)
+
+
+def test_environments_begin_in_the_scene_of_start_and_goal(changing, scenarios):
+    env = gymnasium.make("kinarm/Reach-v0", problem=changing.problem, render_mode="rgb_array")
+    pictures = []
+    for start, goal in zip(*(each[:2] for each in scenarios), strict=True):
+        env.reset(options={"start": start, "goal": goal})
+        np.testing.assert_array_equal(
+            env.unwrapped._episodes.scenes, changing.world.scenes_of(start[None], goal[None])
+        )
+        pictures.append(env.render())
+    assert (pictures[0] != pictures[1]).any()
+    with pytest.raises(KinarmError, match="start and goal decide where random bodies are"):
+        env.reset(options={"start": scenarios[0][0]})
 
 
 def test_problems_survive_files(tmp_path):
