@@ -6,7 +6,7 @@ from pathlib import Path
 from kinarm._fields import Checked, from_plain, init_fields, read_toml
 from kinarm._files import absolute, is_file, shipped_files
 from kinarm.bodies import HeldBody, read_meshes
-from kinarm.errors import POSITIVE, ArmError
+from kinarm.errors import POSITIVE, ArmError, whole_number
 
 PACKAGE = "example-robot-data:"
 """Prefix of sources in the installed package of that name."""
@@ -91,12 +91,15 @@ class ArmSpecification(Checked):
     limits: dict[str, tuple[float, float]] | None = field(default=None, hash=False)
     home: tuple[float, ...] | None = None
     velocity_limits: tuple[float, ...] | None = field(default=None, metadata=POSITIVE)
-    pieces: dict[str, int] | None = field(
-        default=None, hash=False, metadata={"at_most": MOST_PIECES}
-    )
+    pieces: dict[str, int] | None = field(default=None, hash=False)
     held_bodies: tuple[HeldBody, ...] | None = None
     allowed_contacts: tuple[AllowedContact, ...] | None = None
     digest: str | None = None
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        for link, count in (self.pieces or {}).items():
+            whole_number(f"pieces.{link}", count, 1, MOST_PIECES)
 
     def resolved(self, folder: Path) -> "ArmSpecification":
         """The same arm with absolute paths, from a folder."""

@@ -239,8 +239,7 @@ def check_range(name: str, value: Any, demands: Mapping[str, Any]) -> None:
     name : str
         Name of the field, for messages.
     value : object
-        Its value, or a tuple of such, or a table if there are demands; anything
-        but numbers passes.
+        Its value, or a tuple of such; anything but numbers passes.
     demands : mapping
         Metadata of the field. For whole numbers: ``at_least``, 1 by default,
         and ``at_most``. For others: a condition that ``holds``, and what they
@@ -249,9 +248,6 @@ def check_range(name: str, value: Any, demands: Mapping[str, Any]) -> None:
     if isinstance(value, tuple):
         for each in value:
             check_range(name, each, demands)
-    elif isinstance(value, Mapping) and demands:
-        for key, each in value.items():
-            check_range(f"{name}.{key}", each, demands)
     elif type(value) is int:
         whole_number(name, value, demands.get("at_least", 1), demands.get("at_most", math.inf))
     elif isinstance(value, float):

@@ -16,7 +16,7 @@ from kinarm.chain import Chain
 from kinarm.contact_shapes import BETWEEN_CAPSULES, PLANE, WITH_HALFSPACE, ContactShapes
 from kinarm.kernels.compiling import Array, helper, inlined
 from kinarm.kernels.distance import between_segments, closest_to_box
-from kinarm.kernels.kinematics import forward_kinematics, place_bodies, to_frame
+from kinarm.kernels.kinematics import forward_kinematics, to_frame
 from kinarm.kernels.lanes import any_lane, as_numbers, lane_bits, select
 from kinarm.kernels.planes import (
     EVERYDAY,
@@ -147,7 +147,6 @@ def prove_alone(
     heights, bends = as_numbers(block.height), as_numbers(block.bend)
     # Better the planes of pairs that are not proven, and list those that remain.
     take_rows(poses, lane, alone.after)
-    place_bodies(alone.after[alone.after.shape[0] - shapes.placed.shape[0] :], alone.before)
     at_start, n_open, all_open, target_bit = False, 0, 0, 1 << (tested - 1)
     for pair in range(shapes.planes.shape[0]):
         if is_apart(as_numbers(block.bound)[pair, lane]):

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from kinarm.episodes import COLLISION, PAUSED, RUNNING, SUCCESS, TRUNCATED, Episodes, Rules
 from kinarm.kernels.compiling import Array, inlined, lean_kernel
-from kinarm.kernels.kinematics import forward_kinematics
+from kinarm.kernels.kinematics import forward_kinematics, place_bodies
 from kinarm.kernels.lanes import LANES, any_lane, as_numbers, lane_bits, select
 from kinarm.kernels.network import choose_actions, shared_policy
 from kinarm.kernels.planes import GAP
@@ -132,6 +132,8 @@ def advance(counters: NDArray[np.int64], session: Session) -> int:
             for lane in range(row.shape[0]):
                 if still >> lane & 1 == 0:
                     continue
+                if episodes.scenes.shape[0] > 0:
+                    place_bodies(episodes.scenes[row[lane]], alone.before)
                 doubt = prove_alone(lane, chain, shapes, rules.tested, poses, block, alone)
                 if doubt != 0:
                     # The episode leaves the block, at its end or to wait for Coal.

@@ -154,8 +154,9 @@ def load_episode(e: int, lane: int, control: Control, episodes: Episodes, block:
         put(episodes.observation, e, block.observation, 0, lane)
     for pair in range(episodes.planes.shape[1]):
         put(episodes.planes[e], pair, block.planes, pair, lane)
-    put_scene(episodes.scenes, e, lane, block.before)
-    put_scene(episodes.scenes, e, lane, block.after)
+    if episodes.scenes.shape[0] > 0:
+        put_scene(episodes.scenes, e, lane, block.before)
+        put_scene(episodes.scenes, e, lane, block.after)
     if block.weights.shape[1] > 0:
         put(control.weights, control.policy[e], block.weights, 0, lane)
     for power in range(2):

@@ -34,7 +34,7 @@ from kinarm.kernels.kinematics import (
     to_world,
 )
 from kinarm.kernels.lanes import any_lane, select
-from kinarm.kernels.planes import axis_in_world
+from kinarm.kernels.planes import axis_in_world, surface
 from kinarm.kernels.proof import DEPTH, is_exact, radius_of
 
 SWEEPS = 3
@@ -291,23 +291,26 @@ def overlaps(
                 gap += share * half[axis] * travel[axis, pair]
             proven = proven | (wanted & (gap < radius))
             continue
-        # A point deep in an obstacle stays in it longest. In a half-space, a box without end, the
-        # lower end of the segment is deepest. All of it along the edges of the box.
+        # A point deep in an obstacle stays in it longest; in a half-space, the lower end of the
+        # segment is deepest. All of it along the edges of the box.
         frame, none = bodies[j, 2], 0.0 * poses[0, 13]
-        far = none + np.inf
-        lower, upper = (-far, -far, -far), (far, far, none)
-        c, d = to_frame(poses, frame, a), to_frame(poses, frame, b)
-        first = c[2] < d[2]
-        point = select(first, a[0], b[0]), select(first, a[1], b[1]), select(first, a[2], b[2])
+        nx, ny, nz, offset = surface(poses, frame)
         if kind == WITH_BOX:
             hx, hy, hz = poses[frame, 0], poses[frame, 1], poses[frame, 2]
             lower, upper = (-hx, -hy, -hz), (hx, hy, hz)
+            c, d = to_frame(poses, frame, a), to_frame(poses, frame, b)
             centre = excess_over_box(along(c, d, 0.5), lower, upper)
             apart = distance_from_box(centre) >= radius + reach
             if not any_lane(wanted & ~proven & ~apart):
                 continue
-            point = along(a, b, deepest_share(c, d, lower, upper))
-        x, y, z = excess_over_box(to_frame(poses, frame, point), lower, upper)
+            deepest = deepest_share(c, d, lower, upper)
+            point = along(a, b, deepest)
+            x, y, z = excess_over_box(along(c, d, deepest), lower, upper)
+        else:
+            start, end = nx * a[0] + ny * a[1] + nz * a[2], nx * b[0] + ny * b[1] + nz * b[2]
+            first = start < end
+            point = select(first, a[0], b[0]), select(first, a[1], b[1]), select(first, a[2], b[2])
+            x, y, z = none - np.inf, none - np.inf, select(first, start, end) - offset
         if not any_lane(wanted & ~proven & (distance_from_box((x, y, z)) < radius)):
             continue
         # The point's motion along each edge to first order: an arm that slides along an obstacle
@@ -317,10 +320,12 @@ def overlaps(
         for axis in range(min(n, bodies[i, 2])):
             width = share * half[axis]
             u, v, w = jacobian[0, axis], jacobian[1, axis], jacobian[2, axis]
-            speed = rotated_back(poses, frame, u, v, w)
-            x += width * abs(speed[0])
-            y += width * abs(speed[1])
-            z += width * abs(speed[2])
+            if kind == WITH_BOX:
+                u, v, w = rotated_back(poses, frame, u, v, w)
+                x, y = x + width * abs(u), y + width * abs(v)
+            else:
+                w = nx * u + ny * v + nz * w
+            z += width * abs(w)
             # The rest is of second order: a revolute joint turns its own motion and that of every
             # later joint. A pair of joints counts once, a joint with itself by half.
             if not prismatic[axis]:
