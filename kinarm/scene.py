@@ -171,7 +171,7 @@ class Scene(Checked):
 
     @cached_property
     def bodies(self) -> tuple[Body, ...]:
-        """Obstacles, then random bodies, far away, then the ground: what the arm may touch."""
+        """Obstacles, then random bodies (far away), then the ground."""
         obstacles = (each if isinstance(each, Body) else each.body for each in self.obstacles)
         random = (body for each in self.random_bodies for body in each.slots)
         ground = (Body(name="ground", shape="halfspace"),) if self.ground else ()
