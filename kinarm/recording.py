@@ -269,13 +269,11 @@ def record_path(
     if (pair := world.contact_pair(points[0])) is not None:
         raise StartInContactError(0, pair)
     states = _stepwise(world, points)
-    tested = world.substeps(states[:-1], states[1:])
-    touching = world.in_contact(tested.reshape(-1, world.arm.n_joints)).reshape(tested.shape[:2])
     contact = None
-    if touching.any():
-        step = int(touching.any(axis=1).argmax())
-        contact = world.contact(tested[step, touching[step].argmax()])
-        states = np.concatenate([states[: step + 1], states[step : step + 1]])
+    for step, motion in enumerate(pairwise(states)):
+        if (contact := world.contact(*motion)) is not None:
+            states = np.concatenate([states[: step + 1], states[step : step + 1]])
+            break
     distances = world.distances(states, np.tile(aim, (len(states), 1)))
     reached = bool(distances[-1] <= world.problem.task.tolerance)
     horizon = max(world.problem.task.horizon, len(states) - 1)

@@ -43,6 +43,10 @@ class ReferenceEpisode(NamedTuple):
     contact: tuple[str, str] | None
 
 
+SAMPLES = 2000
+"""Configurations of a step that is tested throughout."""
+
+
 class ReferenceSimulator:
     """Steps single episodes with Pinocchio and Coal."""
 
@@ -50,7 +54,9 @@ class ReferenceSimulator:
         self.arm: Arm = simulator.arm
         self.task = simulator.task
         self.step_limit = simulator.step_limit
-        self.tested = simulator.problem.stepping.tested_configurations
+        stepping = simulator.problem.stepping
+        motion = stepping.contact == "motion"
+        self.tested = SAMPLES if motion else stepping.tested_configurations
         self._data = self.arm.model.createData()
         self._world = simulator.world
         self._begin(simulator.world.contact_model)

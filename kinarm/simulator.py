@@ -321,10 +321,9 @@ class Simulator:
     def _decide(self, session: Session, paused: NDArray[np.int64]) -> NDArray[np.int64]:
         """Let Coal refuse steps in doubt; return which episodes go on."""
         episodes = session.episodes
-        ways = self.world.substeps(episodes.q[paused], episodes.target[paused])
-        contacts = self.world.contact_model
-        doubtful = ways, episodes.doubt[paused], episodes.scenes_at(paused)
-        touched, asked = contacts.first_contacts(*doubtful)
+        motions = episodes.q[paused], episodes.target[paused]
+        doubtful = episodes.doubt[paused], episodes.scenes_at(paused)
+        touched, asked = self.world.first_contacts(*motions, *doubtful)
         self.checked_by_coal += asked
         refused = touched != 0
         resumed: NDArray[np.int64] = paused[~refused]

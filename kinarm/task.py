@@ -4,7 +4,7 @@ Numbers out of range are an `InvalidInputError`, what does not match is a `Probl
 """
 
 from dataclasses import dataclass, field, fields
-from typing import NamedTuple
+from typing import Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -166,7 +166,13 @@ class Stepping(Checked):
     tested_configurations : int
         Evenly spaced configurations, from 1 to 32, at which the motion of a
         step is tested for contact, its end included.
+    contact : {"configurations", "motion"}
+        Whether a step touches something at these configurations, or at any time
+        of its motion.
     """
 
     time_step: float = field(default=0.02, metadata=POSITIVE)
     tested_configurations: int = field(default=4, metadata={"at_most": 32})
+    contact: Literal["configurations", "motion"] = field(
+        default="configurations", metadata=OPTIONAL
+    )

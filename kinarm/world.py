@@ -22,6 +22,7 @@ from kinarm.kernels.records import recorded
 from kinarm.kernels.rollout import begin
 from kinarm.kernels.screening import screen
 from kinarm.kernels.session import Alone, Block, Session, furnish, work_space
+from kinarm.motion_contact import contact_in_motion, motions_in_contact
 from kinarm.observation import observation_size
 from kinarm.problem import ProblemLike, ReachProblem
 from kinarm.scene_draws import SceneDraws
@@ -64,7 +65,7 @@ class World(InverseKinematics):
         n_tested = stepping.tested_configurations
         self.rules = Rules(
             step_limit=self.arm.velocity_limits[: self.arm.n_actuated] * stepping.time_step,
-            tested=n_tested,
+            tested=0 if stepping.contact == "motion" else n_tested,
             tolerance=float(task.tolerance),
             horizon=int(task.horizon),
             reward=task.reward.vector,
@@ -238,9 +239,23 @@ class World(InverseKinematics):
         if target is None:
             return self.contact_model.contact(q)
         aim = finite_array("target", target, (self.arm.n_joints,))
+        if self.rules.tested == 0:
+            return contact_in_motion(self.contact_model, q, aim)
         tested = self.substeps(q[None], aim[None])[0]
         touching = np.flatnonzero(self.contact_model.in_contact(tested))
         return self.contact_model.contact(tested[touching[0]]) if touching.size else None
+
+    def first_contacts(
+        self, starts: Array, ends: Array, doubt: NDArray[np.int64], scenes: Array
+    ) -> tuple[NDArray[np.int64], int]:
+        """Let Coal decide about steps in doubt.
+
+        See `kinarm.collision.ContactModel.first_contacts`. Takes ends of steps, shape (n,
+        n_joints) [rad or m].
+        """
+        if self.rules.tested == 0:
+            return motions_in_contact(self.contact_model, starts, ends, doubt, scenes)
+        return self.contact_model.first_contacts(self.substeps(starts, ends), doubt, scenes)
 
     def contact_pair(
         self, configuration: ArrayLike, target: ArrayLike | None = None

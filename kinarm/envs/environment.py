@@ -17,6 +17,7 @@ from kinarm.chain import within_limits
 from kinarm.envs.rendering import RENDER_MODES, EnvPictures
 from kinarm.episodes import Episodes, StepResult
 from kinarm.errors import InvalidInputError, UnknownNameError, one_or_many
+from kinarm.motion_contact import contact_in_motion
 from kinarm.observation import Ranges, observation_bounds
 from kinarm.problem import ProblemLike, ReachProblem
 from kinarm.scenarios import ScenarioQueues
@@ -220,15 +221,18 @@ class ArmEnvironment(Lifecycle):
         contact, refused, world = result.contact, result.collision, self.simulator.world
         if np.count_nonzero(refused) == np.count_nonzero(contact):
             return
-        rows = (refused & (contact == 0)).nonzero()[0]
-        ways = world.substeps(episodes.q[rows], episodes.target[rows])
-        for row, way, doubt in zip(rows.tolist(), ways, episodes.doubt[rows].tolist(), strict=True):
-            tested = (q for k, q in enumerate(way) if doubt >> k & 1)
-            model = world.contact_model
+        for row in (refused & (contact == 0)).nonzero()[0].tolist():
+            model, motion = world.contact_model, (episodes.q[row], episodes.target[row])
             if len(episodes.scenes):
                 model = model.at(episodes.scenes[row])
-            found = map(model.first_in_contact, tested)
-            contact[row] = next((index + 1 for index in found if index is not None), 0)
+            if world.rules.tested == 0:
+                found = contact_in_motion(model, *motion)
+                contact[row] = self.contact_names.index(found.pair if found else None)
+                continue
+            (way,) = world.substeps(*(each[None] for each in motion))
+            tested = (q for k, q in enumerate(way) if episodes.doubt[row] >> k & 1)
+            pairs = map(model.first_in_contact, tested)
+            contact[row] = next((index + 1 for index in pairs if index is not None), 0)
 
     def _make_interface(self, simulator: Simulator, dtype: DTypeLike) -> Interface:
         return Interface(simulator, dtype)
@@ -267,11 +271,11 @@ def fixed_scenario(
     dict
         The same, one row an arm.
     """
-    arm, fixed, given = simulator.arm, {}, options or {}
+    arm, fixed, wanted = simulator.arm, {}, options or {}
     widths = {"start": arm.n_joints, "goal": 3}
-    if len(given) == 1 and simulator.world.has_random_bodies:
+    if len(wanted) == 1 and simulator.world.has_random_bodies:
         raise InvalidInputError("start and goal decide where random bodies are: set both")
-    for name, value in given.items():
+    for name, value in wanted.items():
         if name not in widths:
             raise UnknownNameError("reset option", name, widths)
         array, one = one_or_many(name, value, (widths[name],))

@@ -1,41 +1,43 @@
 """Proof that steps are free of contact, or that bodies touch, for a block of episodes.
 
-A step moves the arm from q to q' and is tested at n configurations q + k/n (q' - q). The height h
-of the second body of a pair above the plane of the first (`kinarm.kernels.planes`) is known at q.
-Along the step it is the least height of some corners, whose second derivative is bounded by a
-*bend* c: at the share s it is at least (1 - s) h + s h' - s (1 - s) c / 2. Where that proves
-nothing, a better plane is taken, and then each configuration between.
-
-Contact is proven by capsules in the shapes of the arm, and by capsules, boxes and half-spaces that
-equal those of the scene: two points that are closer than the radii about them prove an overlap.
+A step moves the arm from q to q' and is tested at n configurations q + k/n (q' - q); n = 0 stands
+for all of its motion, in `INTERVALS`. The height h of the second body of a pair above the plane of
+the first (`kinarm.kernels.planes`) is known at q. Along the step it is the least height of some
+corners, whose second derivative is bounded by a *bend* c: at the share s it is at least
+(1 - s) h + s h' - s (1 - s) c / 2. Where that proves nothing, a better plane is taken, and then
+each configuration or interval between.
 """
 
-import math
-
 from kinarm.chain import Chain
-from kinarm.contact_shapes import BETWEEN_CAPSULES, PLANE, WITH_HALFSPACE, ContactShapes
+from kinarm.contact_shapes import PLANE, WITH_HALFSPACE, ContactShapes
 from kinarm.kernels.compiling import Array, helper, inlined
-from kinarm.kernels.distance import between_segments, closest_to_box
-from kinarm.kernels.kinematics import forward_kinematics, to_frame
+from kinarm.kernels.kinematics import forward_kinematics
 from kinarm.kernels.lanes import any_lane, as_numbers, lane_bits, select
+from kinarm.kernels.overlap import DEPTH, overlap
 from kinarm.kernels.planes import (
     EVERYDAY,
     FINE,
     GAP,
-    axis_in_world,
     height_above,
-    is_placed,
     propose,
     separate,
-    surface,
 )
 from kinarm.kernels.session import Alone, Block, put, take, take_rows
 
-MARGIN, DEPTH = 2e-6, 1e-6
-"""Distance beyond which freedom is claimed, and depth beyond which contact is [m].
+MARGIN = 2e-6
+"""Distance beyond which freedom is claimed [m].
 
 Coal calls contact what is up to 1e-6 m apart, and some 1e-9 m more.
 """
+
+INTERVALS = 16
+"""Parts of a step that is tested throughout."""
+
+
+@inlined
+def first_share(tested: int) -> float:
+    """Share of a step at which the test begins."""
+    return 1.0 / tested if tested > 0 else 0.0
 
 
 @inlined
@@ -70,7 +72,7 @@ def prove_step(shapes: ContactShapes, tested: int, poses: Array, block: Block) -
     bend = 0.0 * block.q[0, 0]
     for axis in range(block.twist.shape[0]):
         bend += block.twist[0, axis] * shapes.farthest[axis]
-    bent, least, share = 0.125 * bend, bend + 1.0, 1.0 / tested
+    bent, least, share = 0.125 * bend, bend + 1.0, first_share(tested)
     for pair in range(shapes.planes.shape[0]):
         before = block.planes[pair, GAP]
         after = height_above(shapes, pair, EVERYDAY, poses, block.planes, pair)
@@ -89,7 +91,7 @@ def renew_planes(
     ``stale`` says whose steps are to be proven. Poses are ``before`` the step and at the target.
     """
     least = 0.0 * block.q[0, 0] + 1.0
-    n_pairs, share = shapes.planes.shape[0], 1.0 / tested
+    n_pairs, share = shapes.planes.shape[0], first_share(tested)
     for pair in range(n_pairs):
         bound = block.bound[pair]
         open_here = stale & ~is_apart(bound)
@@ -119,11 +121,15 @@ def renew_planes(
 
 
 @inlined
-def open_configurations(before: float, after: float, bend: float, tested: int) -> int:
-    """Bit k - 1 is set if the heights do not prove configuration k free."""
-    unproven = 0
-    for k in range(1, tested + 1):
-        share = k / tested
+def open_parts(before: float, after: float, bend: float, tested: int) -> int:
+    """Bit k - 1 is set if the heights do not prove configuration, or interval, k free."""
+    unproven, parts = 0, tested if tested > 0 else INTERVALS
+    # Where the bound, a parabola that opens upwards, is lowest.
+    lowest = 0.5 - (after - before) / bend if bend > 0.0 else 0.0 if before < after else 1.0
+    for k in range(1, parts + 1):
+        share = k / parts
+        if tested == 0:
+            share = min(max(lowest, (k - 1) / parts), share)
         height = (1.0 - share) * before + share * after - 0.5 * share * (1.0 - share) * bend
         unproven |= 0 if is_apart(height) else 1 << (k - 1)
     return unproven
@@ -147,13 +153,13 @@ def prove_alone(
     heights, bends = as_numbers(block.height), as_numbers(block.bend)
     # Better the planes of pairs that are not proven, and list those that remain.
     take_rows(poses, lane, alone.after)
-    at_start, n_open, all_open, target_bit = False, 0, 0, 1 << (tested - 1)
+    at_start, n_open, all_open = False, 0, 0
     for pair in range(shapes.planes.shape[0]):
         if is_apart(as_numbers(block.bound)[pair, lane]):
             continue
         bend = bends[pair, lane]
         before, after = heights[pair, lane], planes[pair, GAP, lane]
-        unproven = open_configurations(before, after, bend, tested)
+        unproven = open_parts(before, after, bend, tested)
         if unproven != 0 and shapes.pairs[pair, 0] != WITH_HALFSPACE:
             if not at_start:
                 take(block.q, 0, lane, alone.q, 0)
@@ -162,49 +168,93 @@ def prove_alone(
             take(block.planes, pair, lane, plane, 0)
             after = separate(shapes, pair, alone.after, alone.relative, alone.simplex, plane)
             before = height_above(shapes, pair, FINE, alone.before, plane, 0)
-            unproven = open_configurations(before, after, bend, tested)
+            unproven = open_parts(before, after, bend, tested)
             heights[pair, lane] = before
             put(plane, 0, block.planes, pair, lane)
         alone.listed[n_open, 0], alone.listed[n_open, 1] = pair, unproven
         n_open += 0 if unproven == 0 else 1
         all_open |= unproven
-    # Look at configurations between up to the first pair that stays in doubt.
-    doubt = all_open & target_bit
-    for k in range(1, tested):
+    # Look at each part up to the first pair that stays in doubt; the target has been looked at.
+    parts = tested if tested > 0 else INTERVALS
+    doubt = all_open & (1 << (tested - 1)) if tested > 0 else 0
+    for k in range(1, parts if tested > 0 else parts + 1):
         bit = 1 << (k - 1)
         if all_open & bit == 0:
             continue
-        place_between(k, tested, lane, chain, block, alone)
-        for index in range(n_open):
-            pair = alone.listed[index, 0]
-            if alone.listed[index, 1] & bit == 0:
-                continue
-            if not is_proven_apart(pair, lane, shapes, block, alone):
-                doubt |= bit
-                break
+        free = is_part_free(k, parts, bit, n_open, tested, lane, chain, shapes, block, alone)
+        if not free and tested == 0 and doubt == 0:
+            # The first interval in doubt is worth a closer look.
+            free, finer = True, INTERVALS * parts
+            for j in range(INTERVALS * (k - 1) + 1, INTERVALS * k + 1):
+                if free:
+                    free = is_part_free(
+                        j, finer, bit, n_open, tested, lane, chain, shapes, block, alone
+                    )
+        doubt |= 0 if free else bit
     return doubt
+
+
+@helper
+def is_part_free(
+    k: int,
+    parts: int,
+    bit: int,
+    n_open: int,
+    tested: int,
+    lane: int,
+    chain: Chain,
+    shapes: ContactShapes,
+    block: Block,
+    alone: Alone,
+) -> bool:
+    """Whether configuration k of so many parts, or the interval to it, is proven free.
+
+    Looks at the listed pairs with this bit, up to the first that is not.
+    """
+    bends = as_numbers(block.bend)
+    if tested == 0:
+        place_between(k - 1, parts, lane, chain, block, alone, alone.after)
+    place_between(k, parts, lane, chain, block, alone, alone.before)
+    for index in range(n_open):
+        pair = alone.listed[index, 0]
+        if alone.listed[index, 1] & bit != 0:
+            bend = bends[pair, lane] / (parts * parts) if tested == 0 else -1.0
+            if not is_proven_apart(pair, lane, bend, shapes, block, alone):
+                return False
+    return True
 
 
 @inlined
 def is_proven_apart(
-    pair: int, lane: int, shapes: ContactShapes, block: Block, alone: Alone
+    pair: int, lane: int, bend: float, shapes: ContactShapes, block: Block, alone: Alone
 ) -> bool:
-    """Whether its or a better plane proves a pair apart at ``alone.before``."""
+    """Whether its or a better plane proves a pair apart at ``alone.before``.
+
+    Unless the bend is negative, also on the way from ``alone.after``, which bends so far.
+    """
     take(block.planes, pair, lane, alone.plane, 0)
     height = height_above(shapes, pair, FINE, alone.before, alone.plane, 0)
+    if bend >= 0.0:
+        height = min(height, height_above(shapes, pair, FINE, alone.after, alone.plane, 0))
+        height -= 0.125 * bend
     if not is_apart(height) and shapes.pairs[pair, 0] != WITH_HALFSPACE:
         height = separate(shapes, pair, alone.before, alone.relative, alone.simplex, alone.plane)
+        if bend >= 0.0:
+            height = min(height, height_above(shapes, pair, FINE, alone.after, alone.plane, 0))
+            height -= 0.125 * bend
     return is_apart(height)
 
 
 @inlined
-def place_between(k: int, tested: int, lane: int, chain: Chain, block: Block, alone: Alone) -> None:
-    """Fill in an episode's poses at configuration k < ``tested`` of its step."""
+def place_between(
+    k: int, parts: int, lane: int, chain: Chain, block: Block, alone: Alone, poses: Array
+) -> None:
+    """Fill in an episode's poses at configuration k of its step, where so many parts are over."""
     q, target = as_numbers(block.q), as_numbers(block.target)
     for joint in range(block.q.shape[1]):
         start, end = q[0, joint, lane], target[0, joint, lane]
-        alone.q[0, joint] = start + k / tested * (end - start)
-    forward_kinematics(chain, alone.q, 0, alone.before)
+        alone.q[0, joint] = end if k == parts else start + k / parts * (end - start)
+    forward_kinematics(chain, alone.q, 0, poses)
 
 
 @helper
@@ -249,56 +299,6 @@ def prove_configurations(
     return free
 
 
-@inlined
-def is_exact(shapes: ContactShapes, pair: int) -> bool:
-    """Whether the shapes of a pair are known exactly."""
-    return shapes.exact[shapes.pairs[pair, 1]] and shapes.exact[shapes.pairs[pair, 2]]
-
-
-@inlined
-def radius_of(shapes: ContactShapes, body: int, poses: Array) -> float:
-    """Radius of a body's capsule [m]; minus infinity if nothing in the body is known."""
-    frame = shapes.bodies[body, 2]
-    radius = 0.0 * poses[0, 13] + shapes.capsules[body, 6]
-    if is_placed(shapes, frame, poses):
-        radius += poses[frame, 3]
-    return radius
-
-
-@helper
-def overlap(shapes: ContactShapes, pair: int, poses: Array) -> float:
-    """Lower bound of a pair's overlap, by what lies in its shapes [m]; negative if apart."""
-    kind, first, second = shapes.pairs[pair, 0], shapes.pairs[pair, 1], shapes.pairs[pair, 2]
-    a, b = axis_in_world(shapes, first, poses)
-    radius = shapes.capsules[first, 6] + radius_of(shapes, second, poses)
-    frame = shapes.bodies[second, 2]
-    if kind == WITH_HALFSPACE:
-        x, y, z, offset = surface(poses, frame)
-        start, end = x * a[0] + y * a[1] + z * a[2], x * b[0] + y * b[1] + z * b[2]
-        return radius - (min(start, end) - offset)
-    if kind == BETWEEN_CAPSULES:
-        c, d = axis_in_world(shapes, second, poses)
-        x, y, z = between_segments(a, b, c, d)
-    else:
-        hx, hy, hz = poses[frame, 0], poses[frame, 1], poses[frame, 2]
-        a, b = to_frame(poses, frame, a), to_frame(poses, frame, b)
-        t = closest_to_box(a, b, (-hx, -hy, -hz), (hx, hy, hz))
-        x, y, z = a[0] + t * (b[0] - a[0]), a[1] + t * (b[1] - a[1]), a[2] + t * (b[2] - a[2])
-        x -= min(max(x, -hx), hx)
-        y -= min(max(y, -hy), hy)
-        z -= min(max(z, -hz), hz)
-    return radius - math.sqrt(x * x + y * y + z * z)
-
-
-@inlined
-def deepest_overlap(shapes: ContactShapes, poses: Array) -> float:
-    """Lower bound of the deepest overlap of all pairs [m]."""
-    depth = 0.0 * poses[0, 13] - 1.0
-    for pair in range(shapes.pairs.shape[0]):
-        depth = max(depth, overlap(shapes, pair, poses))
-    return depth
-
-
 @helper
 def first_contact(
     lane: int,
@@ -311,19 +311,17 @@ def first_contact(
 ) -> int:
     """Number, from 1, of the pair that surely touches first in a step; 0 if none is.
 
-    Looks at the first configuration that ``doubt`` does not show as free.
+    Looks at the first configuration that ``doubt`` does not show as free. Of a step that is tested
+    throughout, it is a pair that touches, perhaps not first.
     """
     k = 1
     while doubt >> (k - 1) & 1 == 0:
         k += 1
-    if k == tested:
-        take(block.target, 0, lane, alone.q, 0)
-        forward_kinematics(chain, alone.q, 0, alone.before)
-    else:
-        place_between(k, tested, lane, chain, block, alone)
+    parts = tested if tested > 0 else INTERVALS
+    place_between(k, parts, lane, chain, block, alone, alone.before)
     for pair in range(shapes.pairs.shape[0]):
         if overlap(shapes, pair, alone.before) > DEPTH:
             return pair + 1
-        if not is_proven_apart(pair, lane, shapes, block, alone):
+        if tested > 0 and not is_proven_apart(pair, lane, -1.0, shapes, block, alone):
             return 0
     return 0

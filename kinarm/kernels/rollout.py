@@ -145,7 +145,7 @@ def advance(counters: NDArray[np.int64], session: Session) -> int:
                     n_alive -= 1
                     episodes.doubt[e] = doubt
                     pair = first_contact(lane, doubt, chain, shapes, rules.tested, block, alone)
-                    episodes.touched[e] = pair
+                    episodes.touched[e] = pair if rules.tested > 0 else 0
                     if pair > 0:
                         refuse_step(e, rules, episodes)
                     else:

@@ -13,7 +13,8 @@ from kinarm.contact_shapes import ContactShapes
 from kinarm.kernels.compiling import Array, kernel, lean_kernel
 from kinarm.kernels.kinematics import forward_kinematics, to_world
 from kinarm.kernels.lanes import LANES, lane_bits
-from kinarm.kernels.proof import DEPTH, deepest_overlap, prove_configurations
+from kinarm.kernels.overlap import DEPTH, deepest_overlap
+from kinarm.kernels.proof import prove_configurations
 from kinarm.kernels.session import Alone, Block, put, put_scene, take
 
 

@@ -56,6 +56,7 @@ CHANGES = {
     "task.reward.collision": {"reward": {"collision": -2}},
     "task.reward.success": {"reward": {"success": 2}},
     "stepping.time_step": {"time_step": 0.01},
+    "stepping.contact": {"contact": "motion"},
     "stepping.tested_configurations": {"tested_configurations": 5},
     "scene.ground": {"scene": Scene(ground=False)},
     "scene.cube_edge": {"scene": Scene(cube_edge=0.1)},

@@ -3,55 +3,10 @@
 import numpy as np
 import pytest
 from hanging_chain import LENGTHS, RADIUS, SLAB, tips
-from numba import njit
+from step_proofs import proofs
 
-from kinarm.kernels.kinematics import forward_kinematics
-from kinarm.kernels.lanes import LANES, as_numbers
-from kinarm.kernels.planes import EVERYDAY, GAP, height_above, propose
-from kinarm.kernels.proof import (
-    DEPTH,
-    MARGIN,
-    first_contact,
-    prove_alone,
-    prove_step,
-    renew_planes,
-)
-from kinarm.kernels.session import furnish, put, work_space
-
-
-@njit
-def prove(chain, shapes, tested, starts, targets, block, alone, bounds, found):
-    for i in range(len(starts)):
-        for lane in range(LANES):
-            put(starts, i, block.q, 0, lane)
-            put(targets, i, block.target, 0, lane)
-        forward_kinematics(chain, block.q, 0, block.before)
-        forward_kinematics(chain, block.target, 0, block.after)
-        for pair in range(len(shapes.planes)):
-            propose(shapes, pair, block.before, block.planes, pair)
-            height = height_above(shapes, pair, EVERYDAY, block.before, block.planes, pair)
-            block.planes[pair, GAP] = height
-        first = prove_step(shapes, tested, block.after, block)
-        second = renew_planes(shapes, tested, first < 1.0, block.before, block.after, block)
-        block.distance[0], block.total[0] = first, second
-        bounds[0, i] = as_numbers(block.distance)[0, 0]
-        bounds[1, i] = as_numbers(block.total)[0, 0]
-        doubt = prove_alone(0, chain, shapes, tested, block.after, block, alone)
-        found[0, i] = doubt
-        if doubt != 0:
-            found[1, i] = first_contact(0, doubt, chain, shapes, tested, block, alone)
-
-
-def proofs(simulator, tested, starts, targets):
-    """Bounds of the least height in steps, by old and by new planes; doubt, and what touches."""
-    chain, shapes, _ = simulator.world.records
-    n = simulator.arm.n_joints
-    sizes = {"n_pairs": len(shapes.planes), "n_placed": len(shapes.placed)}
-    space = work_space(n_joints=n, n_actuated=n, **sizes)
-    furnish(shapes.values.placed, *space)
-    bounds, found = np.zeros((2, len(starts))), np.zeros((2, len(starts)), dtype=np.int64)
-    prove(chain, shapes, tested, starts, targets, *space, bounds, found)
-    return bounds, found[0], found[1] > 0
+from kinarm.kernels.overlap import DEPTH
+from kinarm.kernels.proof import MARGIN
 
 
 @pytest.fixture(scope="module", params=[(), (SLAB,)], ids=["ground", "slab"])
