@@ -107,7 +107,7 @@ class Simulator:
         other.world = self.world.with_tolerance(tolerance)
         return other
 
-    def in_scene(self, start: Array, goal: Array) -> "Simulator":
+    def in_scene(self, start: ArrayLike, goal: ArrayLike) -> "Simulator":
         """The simulator of one episode; see `kinarm.World.in_scene`."""
         other = copy(self)
         other.world = self.world.in_scene(start, goal)

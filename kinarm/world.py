@@ -185,14 +185,16 @@ class World(InverseKinematics):
         drawn = self.problem.scene, self._draws, self.arm.chain
         return drawn_rows(*drawn, starts, goals, self.threads)
 
-    def in_scene(self, start: Array, goal: Array) -> "World":
+    def in_scene(self, start: ArrayLike, goal: ArrayLike) -> "World":
         """The world of one episode, whose random bodies stay where they are.
 
         Takes its start, shape (n_joints,) [rad or m], and its goal, shape (3,) [m].
         """
         if not self.has_random_bodies:
             return self
-        other, scenes = copy(self), self.scenes_of(start[None], goal[None])
+        q = finite_array("start", start, (self.arm.n_joints,))
+        aim = finite_array("goal", goal, (3,))
+        other, scenes = copy(self), self.scenes_of(q[None], aim[None])
         other.has_random_bodies = False
         other.contact_model = self.contact_model.fixed(scenes[0])
         return other
