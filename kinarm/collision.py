@@ -4,6 +4,7 @@
 as flat arrays (`ContactShapes`), from which kernels prove most configurations.
 """
 
+import warnings
 from dataclasses import dataclass, fields, replace
 from functools import cached_property
 from typing import NamedTuple
@@ -129,6 +130,16 @@ class ContactModel:
         data = make_verdicts_reliable(self.geometry.createData())
         # A list, since wrapping results takes longer than the test itself.
         return self.arm.model.createData(), data, list(data.collisionResults)
+
+    @cached_property
+    def measuring(self) -> pin.GeometryData:
+        """Coal's data whose distances do not depend on what was measured before."""
+        data = self.geometry.createData()
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", DeprecationWarning)
+            for request in data.distanceRequests:
+                request.enable_cached_gjk_guess = False
+        return data
 
     @cached_property
     def pair_names(self) -> tuple[tuple[str, str], ...]:

@@ -17,6 +17,9 @@ from kinarm.kernels.proof import INTERVALS
 TOUCHING, TOLD_APART = 1e-6, 2.5e-7
 """Distance at which bodies touch, and motion in half an interval that is not halved [m]."""
 
+MOST_ASKED = 20_000
+"""Configurations after which a motion that slides along something counts as contact."""
+
 
 def contact_in_motion(model: ContactModel, start: Array, end: Array) -> Contact | None:
     """Describe the first contact on a straight way, or return None.
@@ -96,7 +99,7 @@ def first_share(
         reach = speeds[pairs] * 0.5 * (high - low)
         near = distances - reach <= TOUCHING
         if near.any():
-            if reach[near].max() < TOLD_APART:
+            if reach[near].max() < TOLD_APART or asked > MOST_ASKED:
                 return middle, asked
             # The last one is looked at first.
             waiting += [(middle, high, pairs[near]), (low, middle, pairs[near])]
@@ -107,7 +110,7 @@ def _distances(
     model: ContactModel, configuration: Array, pairs: Iterable[int]
 ) -> tuple[Array, list[Array]]:
     """Distances of some pairs, and the closest point of the first body of each [m]."""
-    data, placed, _ = model.workspace
+    data, placed = model.workspace[0], model.measuring
     pin.updateGeometryPlacements(model.arm.model, data, model.geometry, placed, configuration)
     found = [pin.computeDistance(model.geometry, placed, int(pair)) for pair in pairs]
     points = [np.array(each.getNearestPoint1()) for each in found]

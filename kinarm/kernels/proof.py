@@ -33,6 +33,9 @@ Coal calls contact what is up to 1e-6 m apart, and some 1e-9 m more.
 INTERVALS = 16
 """Parts of a step that is tested throughout."""
 
+TOUCHING, CLEAR = 0.99e-6, 1.25e-6
+"""Distances that are contact, and freedom, in such a step, where Coal need not agree [m]."""
+
 
 @inlined
 def first_share(tested: int) -> float:
@@ -147,7 +150,7 @@ def prove_alone(
 ) -> int:
     """Prove what `prove_step` has not of an episode's step, and better its planes.
 
-    Returns a number whose bit k - 1 is set if configuration k is not proven free.
+    Returns a number whose bit k - 1 is set if configuration, or interval, k is not proven free.
     """
     plane, planes = alone.plane, as_numbers(block.planes)
     heights, bends = as_numbers(block.height), as_numbers(block.bend)
@@ -242,7 +245,7 @@ def is_proven_apart(
         if bend >= 0.0:
             height = min(height, height_above(shapes, pair, FINE, alone.after, alone.plane, 0))
             height -= 0.125 * bend
-    return is_apart(height)
+    return height > (CLEAR if bend >= 0.0 else MARGIN)
 
 
 @inlined
@@ -319,8 +322,9 @@ def first_contact(
         k += 1
     parts = tested if tested > 0 else INTERVALS
     place_between(k, parts, lane, chain, block, alone, alone.before)
+    enough = DEPTH if tested > 0 else -TOUCHING
     for pair in range(shapes.pairs.shape[0]):
-        if overlap(shapes, pair, alone.before) > DEPTH:
+        if overlap(shapes, pair, alone.before) > enough:
             return pair + 1
         if tested > 0 and not is_proven_apart(pair, lane, -1.0, shapes, block, alone):
             return 0

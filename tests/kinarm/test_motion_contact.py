@@ -12,6 +12,7 @@ from step_proofs import proofs
 from kinarm.arm import Arm
 from kinarm.bodies import Body
 from kinarm.kernels.proof import MARGIN
+from kinarm.motion_contact import _distances
 from kinarm.problem import PROBLEMS
 from kinarm.scene import Scene
 from kinarm.simulator import Simulator
@@ -114,3 +115,14 @@ def test_random_configurations_are_apart_or_touch_as_before(simulators):
     q = random_configurations(simulators["paper"], 3, 2000)
     whole = changed(simulators["paper"], contact="motion").world
     np.testing.assert_array_equal(whole.in_contact(q), simulators["paper"].world.in_contact(q))
+
+
+def test_distances_do_not_depend_on_what_was_measured_before(simulators):
+    """Of cylinders among others, whose distances Coal finds step by step."""
+    model = simulators["sliding"].world.contact_model
+    q = random_configurations(simulators["sliding"], 5, 60)
+    order = np.random.default_rng(6).permutation(60)
+    pairs = range(len(model.pair_names))
+    there = np.array([_distances(model, each, pairs)[0] for each in q])
+    again = np.array([_distances(model, each, pairs)[0] for each in q[order]])
+    np.testing.assert_array_equal(again, there[order])

@@ -183,7 +183,7 @@ class TestEpisodes:
         assert not changing.world.contact_model.touching(scenarios[0], scenes).any()
 
     def test_the_oracle_knows_each_scene(self, changing, scenarios):
-        chosen = [each[:40] for each in scenarios]
+        chosen = [each[:16] for each in scenarios]
         solutions = Oracle(changing.problem, threads=1).solve_batch(*chosen)
         replayed = changing.rollout_actions(solutions.actions, *chosen)
         np.testing.assert_array_equal(replayed.success, solutions.reachable)
