@@ -149,6 +149,10 @@ class ContactModel:
             for pair in self.geometry.collisionPairs
         )
 
+    def of_row(self, scenes: NDArray[np.float64], row: int) -> "ContactModel":
+        """The model `at` a row of scenes, or this one if there are none."""
+        return self.at(scenes[row]) if len(scenes) else self
+
     def at(self, scene: NDArray[np.float64]) -> "ContactModel":
         """The same model with the scene's bodies elsewhere, until the next call.
 
@@ -261,8 +265,7 @@ class ContactModel:
                 touched[hit] = -1
                 asked += rows.size
                 for row in hit if len(ways) <= FEW else ():
-                    model = self.at(scenes[row]) if len(scenes) else self
-                    index = model.first_in_contact(ways[row, k])
+                    index = self.of_row(scenes, row).first_in_contact(ways[row, k])
                     touched[row] = -1 if index is None else index + 1
         return touched, asked
 

@@ -61,7 +61,7 @@ def motions_in_contact(
     """
     touched, asked = np.zeros(len(starts), dtype=np.int64), 0
     for row, (start, end) in enumerate(zip(starts, ends, strict=True)):
-        there = model.at(scenes[row]) if len(scenes) else model
+        there = model.of_row(scenes, row)
         for k in np.flatnonzero(doubt[row] >> np.arange(INTERVALS) & 1).tolist():
             low, high = k / INTERVALS, (k + 1) / INTERVALS
             # Mostly the end of an interval tells, which is asked sooner than when it began.

@@ -132,9 +132,9 @@ def different_regions(problem: ReachProblem, symmetric: bool) -> int:
 
 def obstacles_are_symmetric(problem: ReachProblem) -> bool:
     """Whether the reflection maps the obstacles to themselves."""
-    bodies = problem.scene.bodies
     if problem.scene.random_bodies:
         return False
+    bodies = problem.scene.bodies
     return {_outline(each, REFLECTION) for each in bodies} == {_outline(each) for each in bodies}
 
 

@@ -222,9 +222,8 @@ class ArmEnvironment(Lifecycle):
         if np.count_nonzero(refused) == np.count_nonzero(contact):
             return
         for row in (refused & (contact == 0)).nonzero()[0].tolist():
-            model, motion = world.contact_model, (episodes.q[row], episodes.target[row])
-            if len(episodes.scenes):
-                model = model.at(episodes.scenes[row])
+            model = world.contact_model.of_row(episodes.scenes, row)
+            motion = episodes.q[row], episodes.target[row]
             if world.rules.tested == 0:
                 found = contact_in_motion(model, *motion)
                 contact[row] = self.contact_names.index(found.pair if found else None)

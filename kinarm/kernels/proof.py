@@ -33,12 +33,12 @@ Coal calls contact what is up to 1e-6 m apart, and some 1e-9 m more.
 INTERVALS = 16
 """Parts of a step that is tested throughout."""
 
-TOUCHING, CLEAR = 0.99e-6, 1.25e-6
+SURE_CONTACT, SURE_FREEDOM = 0.99e-6, 1.25e-6
 """Distances that are contact, and freedom, in such a step, where Coal need not agree [m]."""
 
 
 @inlined
-def first_share(tested: int) -> float:
+def tested_from(tested: int) -> float:
     """Share of a step at which the test begins."""
     return 1.0 / tested if tested > 0 else 0.0
 
@@ -75,7 +75,7 @@ def prove_step(shapes: ContactShapes, tested: int, poses: Array, block: Block) -
     bend = 0.0 * block.q[0, 0]
     for axis in range(block.twist.shape[0]):
         bend += block.twist[0, axis] * shapes.farthest[axis]
-    bent, least, share = 0.125 * bend, bend + 1.0, first_share(tested)
+    bent, least, share = 0.125 * bend, bend + 1.0, tested_from(tested)
     for pair in range(shapes.planes.shape[0]):
         before = block.planes[pair, GAP]
         after = height_above(shapes, pair, EVERYDAY, poses, block.planes, pair)
@@ -94,7 +94,7 @@ def renew_planes(
     ``stale`` says whose steps are to be proven. Poses are ``before`` the step and at the target.
     """
     least = 0.0 * block.q[0, 0] + 1.0
-    n_pairs, share = shapes.planes.shape[0], first_share(tested)
+    n_pairs, share = shapes.planes.shape[0], tested_from(tested)
     for pair in range(n_pairs):
         bound = block.bound[pair]
         open_here = stale & ~is_apart(bound)
@@ -245,7 +245,7 @@ def is_proven_apart(
         if bend >= 0.0:
             height = min(height, height_above(shapes, pair, FINE, alone.after, alone.plane, 0))
             height -= 0.125 * bend
-    return height > (CLEAR if bend >= 0.0 else MARGIN)
+    return height > (SURE_FREEDOM if bend >= 0.0 else MARGIN)
 
 
 @inlined
@@ -322,7 +322,7 @@ def first_contact(
         k += 1
     parts = tested if tested > 0 else INTERVALS
     place_between(k, parts, lane, chain, block, alone, alone.before)
-    enough = DEPTH if tested > 0 else -TOUCHING
+    enough = DEPTH if tested > 0 else -SURE_CONTACT
     for pair in range(shapes.pairs.shape[0]):
         if overlap(shapes, pair, alone.before) > enough:
             return pair + 1
