@@ -14,6 +14,7 @@ from kinarm.simulator import Simulator
 from kinarm.viewer import replay_page
 
 REQUIRED = "KINARM_REQUIRE_BROWSER"
+UNDRAWN = Path(__file__).with_name("undrawn.js")
 PATIENCE = 120_000
 """How long a page may take for anything [ms]: without a graphics card, drawing is slow."""
 
@@ -54,17 +55,25 @@ def browser() -> Iterator[object]:
         launched.close()
 
 
+@pytest.fixture(scope="session")
+def new_context(browser: object) -> Callable[..., object]:
+    """Begin a context without network, in which pages draw nothing unless they are to."""
+
+    def begin(*, drawn: bool = False, **settings: object) -> object:
+        context = browser.new_context(**{"offline": True, **settings})
+        context.set_default_timeout(PATIENCE)
+        if not drawn:
+            context.add_init_script(UNDRAWN.read_text())
+        return context
+
+    return begin
+
+
 class Watched:
     """A page, with everything that it asked for and complained about."""
 
-    def __init__(self, browser: object, path: Path, size: tuple[int, int], calm: bool) -> None:
-        self.context = browser.new_context(
-            viewport={"width": size[0], "height": size[1]},
-            offline=True,
-            color_scheme="light",
-            reduced_motion="reduce" if calm else "no-preference",
-        )
-        self.context.set_default_timeout(PATIENCE)
+    def __init__(self, context: object, path: Path) -> None:
+        self.context = context
         self.page = self.context.new_page()
         self.requests: list[str] = []
         self.complaints: list[str] = []
@@ -99,30 +108,25 @@ class Watched:
 
 
 @pytest.fixture(scope="session")
-def visit(browser: object) -> Callable[..., AbstractContextManager[Watched]]:
+def visit(
+    new_context: Callable[..., object],
+) -> Callable[..., AbstractContextManager[Watched]]:
     """Open a page for the length of a ``with`` block."""
 
     @contextmanager
-    def visited(path: Path, size: tuple[int, int] = (800, 600)) -> Iterator[Watched]:
-        page = Watched(browser, path, size, calm=True)
-        yield page
-        page.context.close()
+    def visited(
+        path: Path, size: tuple[int, int] = (800, 600), *, calm: bool = True, drawn: bool = False
+    ) -> Iterator[Watched]:
+        context = new_context(
+            drawn=drawn,
+            viewport={"width": size[0], "height": size[1]},
+            color_scheme="light",
+            reduced_motion="reduce" if calm else "no-preference",
+        )
+        yield Watched(context, path)
+        context.close()
 
     return visited
-
-
-@pytest.fixture(scope="module")
-def open_page(browser: object) -> Iterator[Callable[..., Watched]]:
-    """Open pages that are closed after a file of tests: drawing them costs time."""
-    opened = []
-
-    def watch(path: Path, size: tuple[int, int] = (800, 600), *, calm: bool = True) -> Watched:
-        opened.append(Watched(browser, path, size, calm))
-        return opened[-1]
-
-    yield watch
-    for each in opened:
-        each.context.close()
 
 
 @pytest.fixture(scope="session")
@@ -147,6 +151,7 @@ def page_file(recorded: list[Recording], tmp_path_factory: pytest.TempPathFactor
 
 
 @pytest.fixture(scope="module")
-def watched(open_page: Callable[..., Watched], page_file: Path) -> Watched:
+def watched(visit: Callable[..., object], page_file: Path) -> Iterator[Watched]:
     """The page, opened once for a file of tests."""
-    return open_page(page_file)
+    with visit(page_file) as opened:
+        yield opened

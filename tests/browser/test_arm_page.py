@@ -192,6 +192,8 @@ def test_contact_is_told_and_goes(watched):
 
 
 def test_collision_shapes_are_switched_on(watched):
+    watched.tell("drawn = true; kinarm.set(kinarm.state.configuration)")
+    watched.page.wait_for_timeout(100)
     before = watched.page.locator("#stage").screenshot()
     watched.page.click("#shapes")
     assert watched.state["shapes"]
@@ -199,6 +201,7 @@ def test_collision_shapes_are_switched_on(watched):
     assert watched.page.locator("#stage").screenshot() != before
     watched.page.click("#shapes")
     assert not watched.state["shapes"]
+    watched.tell("drawn = false")
 
 
 def test_keys(watched):

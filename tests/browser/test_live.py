@@ -17,7 +17,7 @@ COUNT = """() => {
 PLACE = """() => viewer.scene_tree.find(["meshcat", "arm", "axis_1"]).object.position.toArray()"""
 
 
-def test_what_is_drawn_is_seen_by_those_who_come_later(browser):
+def test_what_is_drawn_is_seen_by_those_who_come_later(new_context):
     with LiveServer(7300) as server:
         draw_surroundings(server.window, Scene())
         aim_camera(server.window)
@@ -25,7 +25,8 @@ def test_what_is_drawn_is_seen_by_those_who_come_later(browser):
         placement = np.eye(4)
         placement[:3, 3] = (0.1, 0.2, 0.3)
         frames[1].set_transform(placement)
-        page = browser.new_page(viewport={"width": 300, "height": 200})
+        context = new_context(offline=False, viewport={"width": 300, "height": 200})
+        page = context.new_page()
         requests = []
         page.on("request", lambda request: requests.append(request.url))
         page.goto(server.address)
@@ -35,4 +36,4 @@ def test_what_is_drawn_is_seen_by_those_who_come_later(browser):
         assert triangles > 10_000
         assert page.evaluate(PLACE) == [0.1, 0.2, 0.3]
         assert all(url.startswith(server.address) for url in requests)
-        page.close()
+        context.close()

@@ -27,7 +27,7 @@ def test_a_picture_looks_like_the_page(visit, tmp_path, problem):
     (recording,) = record_rollouts(simulator, rollouts, "still")
     replay_page(recording, tmp_path / "made.html")
     camera = Camera.of_replays(recording.problem)
-    with visit(tmp_path / "made.html", SIZE) as watched:
+    with visit(tmp_path / "made.html", SIZE, drawn=True) as watched:
         watched.page.add_style_tag(content=BARE)
         watched.tell(f"kinarm.lookFrom({list(camera.position)}, {list(camera.target)})")
         watched.tell("kinarm.seek(0)")

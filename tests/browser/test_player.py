@@ -35,12 +35,19 @@ def text(watched, selector):
     return watched.page.locator(selector).inner_text()
 
 
-def test_nothing_is_fetched_and_nothing_fails(watched, page_file):
-    for index in range(3):
-        show(watched, index, 5)
-    watched.page.wait_for_timeout(100)
-    assert watched.requests == [page_file.as_uri()]
-    assert watched.complaints == []
+def test_it_is_drawn_nothing_is_fetched_and_nothing_fails(visit, page_file):
+    """The arm is in the picture: many colours, and different ones at another step."""
+    with visit(page_file, (400, 300), drawn=True) as watched:
+        show(watched, 2, 5)
+        watched.page.wait_for_timeout(100)
+        pictures = []
+        for frame in (0, 40):
+            show(watched, 0, frame)
+            pictures.append(watched.page.locator("#stage").screenshot())
+        assert pictures[0] != pictures[1]
+        assert len(pictures[0]) > 20_000
+        assert watched.requests == [page_file.as_uri()]
+        assert watched.complaints == []
 
 
 @pytest.mark.parametrize("index", [0, 1, 2])
@@ -54,15 +61,6 @@ def test_poses_are_those_of_pinocchio(watched, recorded, index):
             expected = placement(arm, recording.states[frame], name)
             seen = np.array(matrix).reshape(4, 4).T
             np.testing.assert_allclose(seen, expected, rtol=0, atol=1e-6)
-
-
-def test_pixels_are_drawn(watched):
-    """The arm is in the picture: many colours, and different ones at another step."""
-    show(watched, 0, 0)
-    first = watched.page.locator("#stage").screenshot()
-    show(watched, 0, 40)
-    assert first != watched.page.locator("#stage").screenshot()
-    assert len(first) > 20_000
 
 
 def test_the_card_says_what_happens(watched, recorded):
@@ -162,7 +160,7 @@ def test_a_phone_shows_everything(watched, size):
     watched.page.set_viewport_size({"width": 800, "height": 600})
 
 
-def test_it_plays_by_itself_and_a_ghost_comes_along(open_page, recorded, tmp_path):
+def test_it_plays_by_itself_and_a_ghost_comes_along(visit, recorded, tmp_path):
     first = recorded[0]
     other = replace(
         first,
@@ -170,17 +168,17 @@ def test_it_plays_by_itself_and_a_ghost_comes_along(open_page, recorded, tmp_pat
         states=np.concatenate([first.states[:1], first.states[:-1]]),
     )
     replay_page([first], tmp_path / "made.html", ghosts=[other])
-    watched = open_page(tmp_path / "made.html", calm=False)
-    assert watched.state["playing"]
-    show(watched, 0, 20)
-    arm = Arm.load("paper")
-    for run, recording in enumerate((first, other)):
-        expected = placement(arm, recording.states[20], "tool")
-        np.testing.assert_allclose(pose(watched, "tool", run), expected, rtol=0, atol=1e-6)
-    names = watched.page.locator("#runs .name").all_inner_texts()
-    assert names == ["wave", "other"]
-    assert not watched.page.locator("#trial-choice").is_visible()
-    assert watched.complaints == []
+    with visit(tmp_path / "made.html", calm=False) as watched:
+        assert watched.state["playing"]
+        show(watched, 0, 20)
+        arm = Arm.load("paper")
+        for run, recording in enumerate((first, other)):
+            expected = placement(arm, recording.states[20], "tool")
+            np.testing.assert_allclose(pose(watched, "tool", run), expected, rtol=0, atol=1e-6)
+        names = watched.page.locator("#runs .name").all_inner_texts()
+        assert names == ["wave", "other"]
+        assert not watched.page.locator("#trial-choice").is_visible()
+        assert watched.complaints == []
 
 
 GROUPS = ("hand touches bench within 3 steps", "truncated", "truncated")
@@ -195,9 +193,10 @@ def listed_file(recorded, tmp_path_factory):
 
 
 @pytest.fixture(scope="module")
-def listed(open_page, listed_file):
+def listed(visit, listed_file):
     """That page where there is room for the list."""
-    return open_page(listed_file, (1020, 660))
+    with visit(listed_file, (1020, 660)) as opened:
+        yield opened
 
 
 def test_trials_are_listed_in_groups(listed, recorded):
@@ -232,17 +231,18 @@ def test_the_list_is_hidden_and_shown(listed):
     assert panel.is_visible()
 
 
-def test_on_a_phone_the_list_waits_until_it_is_asked_for(open_page, listed_file):
-    page = open_page(listed_file, (390, 844)).page
-    panel = page.locator("#trial-list")
-    assert not panel.is_visible()
-    page.locator("#list").click()
-    box = panel.bounding_box()
-    assert box["x"] >= 0
-    assert box["x"] + box["width"] <= 390
-    assert box["y"] + box["height"] <= page.locator("#dock").bounding_box()["y"]
-    page.locator(".chip").first.click()
-    assert not panel.is_visible()
+def test_on_a_phone_the_list_waits_until_it_is_asked_for(visit, listed_file):
+    with visit(listed_file, (390, 844)) as watched:
+        page = watched.page
+        panel = page.locator("#trial-list")
+        assert not panel.is_visible()
+        page.locator("#list").click()
+        box = panel.bounding_box()
+        assert box["x"] >= 0
+        assert box["x"] + box["width"] <= 390
+        assert box["y"] + box["height"] <= page.locator("#dock").bounding_box()["y"]
+        page.locator(".chip").first.click()
+        assert not panel.is_visible()
 
 
 @pytest.mark.parametrize("size", [(1280, 900), (390, 844)])

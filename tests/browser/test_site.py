@@ -40,12 +40,12 @@ def pages() -> list[Page]:
         ("most replays", "phone"),
     ],
 )
-def test_page_is_quiet_legible_and_fits(browser, pages, chosen, size):
+def test_page_is_quiet_legible_and_fits(new_context, pages, chosen, size):
     page = max(pages, key=CHOSEN[chosen])
     width, height = SIZES[size]
     screen = {"viewport": {"width": width, "height": height}}
     # Replays stand still: drawing all of a page at once takes minutes without a graphics card.
-    context = browser.new_context(**screen, offline=True, reduced_motion="reduce")
+    context = new_context(**screen, reduced_motion="reduce")
     try:
         opened, complaints = context.new_page(), []
         opened.on("pageerror", lambda error: complaints.append(str(error)))
