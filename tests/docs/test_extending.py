@@ -18,8 +18,6 @@ from pages import ROOT, named_blocks
 from kinarm.evaluation import Study
 from kinarm.evaluation.commands import evaluate, replay, train
 from kinarm.evaluation.experiments import table
-from kinarm.evaluation.experiments.clusters import RayExecutor
-from kinarm.evaluation.experiments.executors import LocalExecutor
 from kinarm.evaluation.experiments.page import write_all
 from kinarm.policies import learners, load_policy, training
 from kinarm.problem import ReachProblem
@@ -92,27 +90,11 @@ TOYS = {
 }
 
 
-@pytest.mark.parametrize(
-    "executor",
-    [
-        LocalExecutor(2),
-        pytest.param(
-            RayExecutor("local", 2),
-            marks=[pytest.mark.slow, pytest.mark.filterwarnings("ignore")],  # Ray's own
-        ),
-    ],
-)
-def test_experiments_train_it_wherever_they_run(
-    executor: LocalExecutor | RayExecutor,
-    toy: None,
-    folder: Path,
-    monkeypatch: pytest.MonkeyPatch,
+def test_experiments_train_it_in_other_processes(
+    toy: None, folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    if isinstance(executor, RayExecutor):
-        pytest.importorskip("ray")
-        monkeypatch.setenv("RAY_ACCEL_ENV_VAR_OVERRIDE_ON_ZERO", "0")
     monkeypatch.setenv("PYTHONPATH", os.pathsep.join([str(folder), str(ROOT)]))
-    study = Study(TOYS, folder / "study").run(executor=executor)
+    study = Study(TOYS, folder / "study").run(jobs=2)
     assert [group.entry.name for group in study.groups()] == ["toy", "by module"]
     assert len(study) == 4
 

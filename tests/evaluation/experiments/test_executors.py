@@ -26,7 +26,6 @@ NOBODY = "127.0.0.1:9"
 
 needs_slurm = pytest.mark.skipif(find_spec("submitit") is None, reason="needs the extra slurm")
 needs_ray = pytest.mark.skipif(find_spec("ray") is None, reason="needs the extra ray")
-of_ray = [needs_ray, pytest.mark.slow, pytest.mark.filterwarnings("ignore")]
 
 
 @pytest.fixture(autouse=True)
@@ -41,7 +40,6 @@ def _surroundings(monkeypatch):
     params=[
         "one process",
         "two processes",
-        pytest.param("ray", marks=of_ray),
         pytest.param("slurm", marks=[needs_slurm, pytest.mark.slow]),
     ]
 )
@@ -50,32 +48,29 @@ def executor(request, tmp_path):
     return {
         "one process": LocalExecutor(1),
         "two processes": LocalExecutor(2),
-        "ray": RayExecutor("local", jobs=2),
         "slurm": SlurmExecutor(tmp_path / "slurm", bundle=3, cluster="local"),
     }[request.param]
 
 
-class TestEach:
-    def test_every_task_is_done_once(self, executor, tmp_path):
-        (tmp_path / "done").mkdir()
-        found = dict(executor.map(partial(touch, tmp_path / "done"), range(7)))
-        assert found == dict.fromkeys(range(7))
-        assert sorted(path.name for path in (tmp_path / "done").iterdir()) == [*"0123456"]
+def test_every_task_is_done_once_and_what_it_raises_is_its_result(executor, tmp_path):
+    (tmp_path / "done").mkdir()
+    found = dict(executor.map(partial(touch, tmp_path / "done"), [*range(7), "no/where"]))
+    failure = found.pop("no/where")
+    assert isinstance(failure, Failure)
+    assert "FileNotFoundError" in failure.trace
+    assert found == dict.fromkeys(range(7))
+    assert sorted(path.name for path in (tmp_path / "done").iterdir()) == [*"0123456"]
 
-    def test_what_a_task_raises_is_its_result(self, executor):
-        found = dict(executor.map(partial(divmod, 6), [0, 2, 3]))
-        assert (found[2], found[3]) == ((3, 0), (2, 0))
-        assert isinstance(found[0], Failure)
-        assert "ZeroDivisionError" in found[0].trace
 
-    def test_nothing_to_do(self, executor):
-        assert list(executor.map(square, [])) == []
+def test_nothing_to_do(executor):
+    assert list(executor.map(square, [])) == []
 
-    def test_work_of_another_kinarm_is_refused(self, executor):
-        work = partial(do_alike, square, {**clusters.identity(), "coal": "0.0.1"})
-        ((_, failure),) = executor.map(work, [1])
-        assert failure.error.startswith("a worker differs from this process: coal is ")
-        assert failure.error.endswith(" there, 0.0.1 here")
+
+def test_work_of_another_kinarm_is_refused():
+    work = partial(do_alike, square, {**clusters.identity(), "coal": "0.0.1"})
+    ((_, failure),) = LocalExecutor(1).map(work, [1])
+    assert failure.error.startswith("a worker differs from this process: coal is ")
+    assert failure.error.endswith(" there, 0.0.1 here")
 
 
 def test_one_at_a_time_tasks_are_done_in_the_given_order():
@@ -85,9 +80,11 @@ def test_one_at_a_time_tasks_are_done_in_the_given_order():
 @needs_ray
 @pytest.mark.slow
 @pytest.mark.filterwarnings("ignore")
-def test_what_lost_workers_had_begun_is_done_again_on_a_cluster(tmp_path):
-    done = RayExecutor("local", 2).map(partial(kill_own_process_once, tmp_path), range(4))
-    assert sorted(done) == [(number, number) for number in range(4)]
+def test_a_cluster_does_again_what_lost_workers_had_begun(tmp_path):
+    work = partial(kill_own_process_once, tmp_path)
+    found = dict(RayExecutor("local", 2).map(work, [0, 1, 2, 3, "no number"]))
+    assert "TypeError" in found.pop("no number").trace
+    assert found == {number: number for number in range(4)}
 
 
 def test_a_lost_worker(tmp_path):
