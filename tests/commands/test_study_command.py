@@ -143,7 +143,7 @@ class TestBadInput:
         assert words in answer.err
 
 
-@pytest.mark.slow
+@pytest.mark.rare
 def test_kills_at_random_moments(command, file, tmp_path):
     """Whatever is killed, and whenever: the same command ends where one that lived does."""
     file.write_text(STUDY.replace("seeds = 3", "seeds = 20"))

@@ -68,9 +68,14 @@ def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def target(wheel: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Install the wheel into a folder of its own."""
+    """Install the wheel into a folder of its own, beside what the clone has compiled."""
     folder = tmp_path_factory.mktemp("target")
-    call(*PIP, "install", "--no-deps", "--no-index", "--target", folder, wheel, cwd=folder)
+    options = ("--no-deps", "--no-index", "--no-compile", "--target")
+    call(*PIP, "install", *options, folder, wheel, cwd=folder)
+    for file in (ROOT / "kinarm").rglob("*.nb[ci]"):
+        copied = folder / file.relative_to(ROOT)
+        copied.parent.mkdir(exist_ok=True)
+        shutil.copyfile(file, copied)
     return folder
 
 
