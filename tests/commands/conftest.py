@@ -13,6 +13,7 @@ import pytest
 from oracle_calls import count_calls
 
 from kinarm.__main__ import COMMANDS
+from kinarm.evaluation import EvaluationRequest, ReplayRequest
 from kinarm.policies import Policy, recipe, train_policy
 from kinarm.problem import PROBLEMS
 
@@ -132,20 +133,20 @@ def replaying(run, tmp_path) -> Callable[..., Answer]:
 
 
 @pytest.fixture(scope="session")
-def evaluation(run_outside, policy_folder, tmp_path_factory) -> Path:
+def evaluation(policy_folder, tmp_path_factory) -> Path:
     """An evaluation of a policy and of a baseline."""
     folder = tmp_path_factory.mktemp("evaluation")
-    options = ("--policy", policy_folder / "mine-seed0.npz", "--policy", "random")
-    settings = ("--task", "right", "--trials", 12, "--seed", 4, "--no-oracle")
-    assert run_outside("kinarm-eval", *options, *settings, "--out", folder).status == 0
+    policies = (str(policy_folder / "mine-seed0.npz"), "random")
+    settings = {"problems": ("right",), "trials": 12, "seed": 4, "oracle": False}
+    EvaluationRequest(policies=policies, out=folder, **settings).run()
     return folder / "evaluation.json"
 
 
 @pytest.fixture(scope="session")
-def recordings(run_outside, policy_folder, tmp_path_factory) -> Path:
+def recordings(policy_folder, tmp_path_factory) -> Path:
     """Recordings of four trials."""
     folder = tmp_path_factory.mktemp("recordings")
-    options = ("--policy", policy_folder / "mine-seed0.npz", "--trials", 4, "--no-oracle")
-    files = ("--out", folder / "page.html", "--record", folder / "made.npz")
-    assert run_outside("kinarm-replay", *options, *files).status == 0
+    policy = str(policy_folder / "mine-seed0.npz")
+    files = {"out": folder / "page.html", "record": folder / "made.npz"}
+    ReplayRequest(policy=policy, trials=4, oracle=False, **files).run()
     return folder / "made.npz"

@@ -93,14 +93,10 @@ def test_training_help_tells_the_default_of_every_setting(run, learner, monkeypa
     assert [option for option in options if "(default: " not in option] == []
 
 
-@pytest.mark.parametrize("unbuffered", ["", "1"])
-@pytest.mark.parametrize(
-    "words",
-    [("kinarm-eval", "--help"), ("kinarm-eval", "--policy", "zero", "--task", "left", "--json")],
-)
+@pytest.mark.parametrize(("words", "unbuffered"), [("--help", "1"), ("zero --task left", "")])
 def test_a_closed_pipe_shows_no_error(command, words, unbuffered):
     with subprocess.Popen(
-        command(*words),
+        command("kinarm-eval", *words.split()),
         cwd=ROOT,
         env={**os.environ, "PYTHONUNBUFFERED": unbuffered},
         stdout=subprocess.PIPE,

@@ -49,14 +49,16 @@ def listens(port: int, host: str = "127.0.0.1") -> bool:
         return probe.connect_ex((host, port)) == 0
 
 
-@pytest.mark.parametrize("sent", [signal.SIGINT, signal.SIGTERM, signal.SIGKILL])
-def test_nothing_is_left_behind(live, sent):
+@pytest.mark.parametrize("sent", [signal.SIGINT, signal.SIGKILL])
+def test_it_serves_this_machine_and_leaves_nothing_behind(live, sent):
+    """127.0.0.2 is this machine too, and would answer if every interface were bound."""
     port = free_port()
     process, line = live(port)
     assert f"http://127.0.0.1:{port}/ " in line
     assert children(process.pid) == []
     with urllib.request.urlopen(f"http://127.0.0.1:{port}/") as page:
         assert b"meshcat.js" in page.read()
+    assert not listens(port, "127.0.0.2")
     process.send_signal(sent)
     status = process.wait(60)
     assert not listens(port)
@@ -64,11 +66,3 @@ def test_nothing_is_left_behind(live, sent):
         assert status == -sent
     else:
         assert (status, process.stderr.read()) == (130, "kinarm-replay: interrupted\n")
-
-
-def test_only_this_machine_is_served(live):
-    """127.0.0.2 is this machine too, and would answer if every interface were bound."""
-    port = free_port()
-    live(port)
-    assert listens(port)
-    assert not listens(port, "127.0.0.2")

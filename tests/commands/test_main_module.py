@@ -67,9 +67,12 @@ def test_every_command_tells_the_version(run, program):
     assert answer.out == f"kinarm {metadata.version('kinarm')}\n"
 
 
-def test_it_prints_the_completion_of_all_commands():
-    pytest.importorskip("shtab")
-    done = type_in("--print-completion", "bash")
-    assert (done.returncode, done.stderr) == (0, "")
-    ends = [line.split()[-1] for line in done.stdout.splitlines() if line.startswith("complete ")]
-    assert sorted(ends) == sorted(SCRIPTS)
+def test_it_prints_the_completion_of_its_commands(capfd, monkeypatch):
+    """Each in a process of its own, whose output this one does not see."""
+    few = {name: COMMANDS[name] for name in ("arms", "eval")}
+    monkeypatch.setattr("kinarm.__main__.COMMANDS", few)
+    with pytest.raises(SystemExit):
+        main(("--print-completion", "bash"))
+    lines = capfd.readouterr().out.splitlines()
+    ends = [line.split()[-1] for line in lines if line.startswith("complete ")]
+    assert ends == ["kinarm-arms", "kinarm-eval"]

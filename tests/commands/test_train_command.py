@@ -19,8 +19,8 @@ from kinarm.problem import PROBLEMS
 from kinarm.task import RewardWeights
 
 ROOT = Path(__file__).resolve().parents[2]
-LONG = {"iterations": 2000, "directions": 2, "top_directions": 2}
-LONG_OPTIONS = ["--iterations", "2000", "--directions", "2", "--top-directions", "2"]
+LONG = {"iterations": 1000, "directions": 2, "top_directions": 2}
+LONG_OPTIONS = ["--iterations", "1000", "--directions", "2", "--top-directions", "2"]
 TRAIN_WITH_FREQUENT_CHECKPOINTS = """
 import signal, sys
 from kinarm.evaluation.commands import train
@@ -171,7 +171,7 @@ def test_other_settings_are_refused_when_resuming(run, tmp_path, option, told):
 
 def interrupt(process: subprocess.Popen, checkpoint: Path) -> str:
     """Send Ctrl-C once a training has got somewhere; return what it says on standard error."""
-    while not (checkpoint.exists() and load_checkpoint(checkpoint)[1].iteration >= 300):
+    while not (checkpoint.exists() and load_checkpoint(checkpoint)[1].iteration >= 100):
         assert process.poll() is None, process.stderr.read()
         time.sleep(0.02)
     process.send_signal(signal.SIGINT)
@@ -196,7 +196,7 @@ def test_ctrl_c_and_resume_give_the_uninterrupted_policy(run, tmp_path):
     assert "Traceback" not in errors
     assert errors.splitlines()[-1].startswith("kinarm-train: interrupted")
     _, state = load_checkpoint(checkpoint)
-    assert 300 <= state.iteration < LONG["iterations"]
+    assert 100 <= state.iteration < LONG["iterations"]
     assert not out.exists()
 
     assert run("kinarm-train", "ars", "--out", out, "--resume").status == 0

@@ -165,7 +165,7 @@ def test_what_was_to_be_replaced_is_trained_anew(run, tmp_path):
 
 def start(command, folder: Path, *extra: object) -> subprocess.Popen:
     """Begin a long training of three seeds, two at a time."""
-    arguments = ("ars", "--problem", "right", "--iterations", 800, *SMALL, "--seeds", 3)
+    arguments = ("ars", "--problem", "right", "--iterations", 300, *SMALL, "--seeds", 3)
     return subprocess.Popen(
         command("kinarm-train", *arguments, "--jobs", 2, "--out", folder, *extra),
         cwd=ROOT,
@@ -219,5 +219,5 @@ def test_ctrl_c_and_lost_workers_keep_every_seed_and_say_how_to_go_on(command, t
     _, errors = process.communicate(timeout=300)
     assert process.returncode == 0, errors
     for seed in range(3):
-        expected = train_policy(config(seed, iterations=800)).policy
+        expected = train_policy(config(seed, iterations=300)).policy
         check_equal(Policy.load(folder / f"{NAME.format(seed)}.npz"), expected)
