@@ -3,51 +3,16 @@
 import os
 import subprocess
 import sys
-from pathlib import Path
+
+import pytest
 
 SCRIPT = """
 import resource, sys
-import numpy as np
 if "full" in sys.argv:
     resource.setrlimit(resource.RLIMIT_FSIZE, (0, 0))
-from kinarm.kernels.distance import distances_from_hull
-distances = np.zeros(2)
-distances_from_hull(np.zeros((1, 3)), np.ones((2, 3)), distances)
-assert (distances > 1).all()
-print(sum(distances_from_hull.stats.cache_hits.values()))
+from arm.kernels.outer import value
+print(value(1.0), value.stats.cache_hits.total())
 """
-
-
-def found(folder, *arguments):
-    """Call a kernel in another process; says whether its machine code was found in a folder."""
-    done = subprocess.run(
-        [sys.executable, "-c", SCRIPT, *arguments],
-        env={**os.environ, "NUMBA_CACHE_DIR": str(folder)},
-        capture_output=True,
-        text=True,
-        check=False,
-        timeout=300,
-    )
-    assert (done.returncode, done.stderr) == (0, "")
-    return int(done.stdout)
-
-
-def test_whatever_happens_to_the_files_kernels_work(tmp_path):
-    """A full disk leaves none; damaged ones, and a flipped bit of machine code, are noticed."""
-    assert [found(tmp_path, *full) for full in (["full"], [])] == [0, 0]
-
-    (path,) = tmp_path.rglob("*.nbc")
-    content = bytearray(path.read_bytes())
-    # In the middle of an operation: unnoticed, the kernel would run and compute something else.
-    content[content.index(b"\x7fELF") + 256] ^= 1
-    path.write_bytes(content)
-    assert found(tmp_path) == 0
-
-    for path in (damaged := [path for path in tmp_path.rglob("*.nb*") if path.is_file()]):
-        path.write_bytes(path.read_bytes()[:-7])
-    assert damaged
-    assert [found(tmp_path) for _ in range(2)] == [0, 1]
-
 
 SOURCES = {
     "constants.py": "FACTOR = 2.0\n",
@@ -81,38 +46,66 @@ def scaled(x):
 }
 
 
-def test_machine_code_is_as_fresh_as_all_that_is_compiled_in(tmp_path):
-    """A package of kernels is changed, file by file; nothing but what changes is compiled anew."""
-    package = tmp_path / "arm"
+@pytest.fixture
+def package(tmp_path):
+    """A package of kernels."""
     for name, text in SOURCES.items():
-        (package / name).parent.mkdir(parents=True, exist_ok=True)
-        (package / name).write_text(text)
+        (tmp_path / "arm" / name).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / "arm" / name).write_text(text)
+    return tmp_path / "arm"
 
-    def value_of_one(old="", new="", file="__init__.py"):
-        """The kernel's value for 1 after a change, and whether it was in the cache."""
-        path = package / file
-        path.write_text(path.read_text().replace(old, new) if old else path.read_text() + new)
-        asked = "print(value(1.0), value.stats.cache_hits.total())"
-        ask = f"from arm.kernels.outer import value; {asked}"
+
+@pytest.fixture
+def value_of_one(package):
+    """Call the kernel in another process: its value for 1, and whether it was in the cache."""
+    folders = {"NUMBA_CACHE_DIR": package.parent / "cache", "PYTHONPATH": package.parent}
+
+    def call(*arguments):
         done = subprocess.run(
-            [sys.executable, "-c", ask],
-            env={
-                **os.environ,
-                "NUMBA_CACHE_DIR": str(tmp_path / "cache"),
-                "PYTHONPATH": str(tmp_path),
-            },
+            [sys.executable, "-c", SCRIPT, *arguments],
+            env={**os.environ, **{name: str(folder) for name, folder in folders.items()}},
             capture_output=True,
             text=True,
-            check=True,
-            cwd=Path(__file__).parent,
+            check=False,
         )
+        assert (done.returncode, done.stderr) == (0, "")
         number, hits = done.stdout.split()
         return float(number), hits == "1"
 
+    return call
+
+
+def test_whatever_happens_to_the_files_kernels_work(package, value_of_one):
+    """A full disk leaves none; damaged ones, and a flipped bit of machine code, are noticed."""
+    anew, found = (40.0, False), (40.0, True)
+    assert [value_of_one("full"), value_of_one()] == [anew, anew]
+
+    (path,) = (package.parent / "cache").rglob("*.nbc")
+    content = bytearray(path.read_bytes())
+    # In the middle of an operation: unnoticed, the kernel would run and compute something else.
+    content[content.index(b"\x7fELF") + 256] ^= 1
+    path.write_bytes(content)
+    assert value_of_one() == anew
+
+    damaged = [path for path in path.parent.iterdir() if path.suffix in (".nbi", ".nbc")]
+    assert damaged
+    for each in damaged:
+        each.write_bytes(each.read_bytes()[:-7])
+    assert [value_of_one(), value_of_one()] == [anew, found]
+
+
+def test_machine_code_is_as_fresh_as_all_that_is_compiled_in(package, value_of_one):
+    """Files are changed, one by one; nothing but what changes is compiled anew."""
+
+    def change(file, old, new):
+        path = package / file
+        path.write_text(path.read_text().replace(old, new) if old else new)
+        return value_of_one()
+
     assert value_of_one() == (40.0, False)
-    assert value_of_one(new="UNUSED = 1\n", file="kernels/other.py") == (40.0, True)
-    assert value_of_one("1.0", "2.0", "kernels/inner.py") == (60.0, False)
-    assert value_of_one("2.0", "3.0", "constants.py") == (90.0, False)
+    assert change("kernels/other.py", "", "UNUSED = 1\n") == (40.0, True)
+    assert change("kernels/inner.py", "1.0", "2.0") == (60.0, False)
+    assert change("constants.py", "2.0", "3.0") == (90.0, False)
 
 
 def test_versions_of_numba_that_are_not_known_are_refused_in_one_line():
