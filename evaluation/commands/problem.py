@@ -1,4 +1,4 @@
-"""``kinarm-problem``: list, show and check problems."""
+"""``kinarm-problem``: list, show, check and import problems."""
 
 import json
 from dataclasses import dataclass, field
@@ -10,9 +10,12 @@ from kinarm._command_line import Commands, run_commands
 from kinarm._console import working
 from kinarm._files import check_output, write_atomically, write_text
 from kinarm._tables import print_table
-from kinarm.errors import FROM_ZERO, TRIALS
+from kinarm.arm_specification import ArmSpecification, arm_names
+from kinarm.bodies import Point
+from kinarm.errors import FROM_ZERO, TRIALS, InvalidInputError
 from kinarm.problem import ReachProblem, problem_names
 from kinarm.problem_options import ProblemOptions, say_choices
+from kinarm.scene import Mount
 
 if TYPE_CHECKING:
     from kinarm.evaluation.problem_check import ProblemCheck
@@ -101,6 +104,35 @@ class CheckRequest(ShowRequest):
         return check
 
 
+@dataclass(frozen=True, kw_only=True)
+class ImportRequest:
+    """Turn planning scenes and requests of MoveIt into problem files.
+
+    Parameters
+    ----------
+    scene, request : Path
+        YAML file of a planning scene, or a folder of scene*.yaml and
+        request*.yaml; and that of the motion plan request.
+    arm : str
+        The arm: its name, a URDF, or an arm file.
+    position, rpy : tuple of float
+        Where its base stands in the fixed frame of the scene [m], and roll,
+        pitch and yaw [rad].
+    out : Path
+        Folder of the problem files, which are called as the scenes.
+    overwrite : bool
+        Replace earlier files.
+    """
+
+    scene: Path = field(metadata={"flag": "scene", "metavar": "SCENE"})
+    request: Path | None = field(default=None, metadata={"flag": "request", "metavar": "REQUEST"})
+    arm: str = field(metadata={"metavar": "ARM", "names": arm_names})
+    position: Point = (0.0, 0.0, 0.0)
+    rpy: Point = (0.0, 0.0, 0.0)
+    out: Path = field(metadata={"metavar": "FOLDER"})
+    overwrite: bool = False
+
+
 def write_picture(path: Path, problem: ReachProblem) -> None:
     """Write a picture of the arm at home, with a goal in mid-region."""
     from matplotlib.image import imsave
@@ -139,12 +171,39 @@ def _check(request: CheckRequest) -> None:
             print(f"  written  {path}")
 
 
+def _import(request: ImportRequest) -> None:
+    from kinarm.collision import ContactModel
+    from kinarm.moveit import import_problem
+
+    arm = ArmSpecification(source=request.arm).resolved(Path())
+    mount = Mount(position=request.position, rpy=request.rpy)
+    scenes = [request.scene] if request.request else sorted(request.scene.glob("scene*.yaml"))
+    if not scenes:
+        raise InvalidInputError(f"{request.scene} is no folder with files such as scene1.yaml")
+    made = {}
+    for scene in scenes:
+        out = request.out / f"{scene.stem}.toml"
+        check_output(out, overwrite=request.overwrite)
+        beside = scene.with_name(scene.name.replace("scene", "request", 1))
+        made[out] = import_problem(scene, request.request or beside, arm, mount)
+    both = 0
+    for out, (problem, start_and_goal) in made.items():
+        problem.save(out)
+        contact = ContactModel.build(problem.load_arm(), problem.scene)
+        pairs = list(map(contact.contact_pair, start_and_goal))
+        start, goal = ("free" if pair is None else " touches ".join(pair) for pair in pairs)
+        print(f"{out}: start {start}, goal {goal}")
+        both += pairs == [None, None]
+    print(f"start and goal are free in {both} of {len(made)} problems")
+
+
 COMMANDS: Commands = {
     "list": (ListRequest, lambda _: print_table(HEADINGS, rows(), EXPENDABLE)),
     "show": (ShowRequest, lambda request: print(request.resolve().to_toml(), end="")),
     "check": (CheckRequest, _check),
+    "import": (ImportRequest, _import),
 }
 
 
-main = partial(run_commands, "kinarm-problem", "List, show and check problems.", COMMANDS)
+main = partial(run_commands, "kinarm-problem", "List, show, check and import problems.", COMMANDS)
 """Run the command line."""

@@ -66,6 +66,7 @@ TRAINING = (
         ("kinarm-problem list", ""),
         ("kinarm-problem show", "--arm --tool-frame --package-dir --scene --task"),
         ("kinarm-problem check", "--arm --scene --trials --seed --picture --json --overwrite"),
+        ("kinarm-problem import", "request --arm --position --rpy --out --overwrite"),
         ("kinarm-arms list", ""),
         ("kinarm-arms show", "--tool-frame"),
         ("kinarm-study status", ""),

@@ -156,3 +156,75 @@ def test_refusals(run, write, tmp_path, command, text, words):
 def test_bad_usage(run, write, tmp_path, arguments, words):
     check_refused(run("kinarm-problem", *arguments), *words)
     assert list(tmp_path.iterdir()) == []
+
+
+class TestImport:
+    BOX = (
+        "  - id: box\n    primitives: [{type: box, dimensions: [0.1, 0.1, 0.1]}]\n"
+        "    primitive_poses: [{position: [%s, 0, 0.5], orientation: [0, 0, 0, 1]}]\n"
+    )
+
+    @pytest.fixture
+    def pairs(self, write, tmp_path):
+        """A folder with two pairs; in the second one the arm touches the box."""
+        pytest.importorskip("yaml")
+        arm = PROBLEMS["right"].load_arm()
+        joints = "".join(
+            f"  - {{joint_name: {name}, position: {at}}}\n"
+            for name, at in zip(arm.joint_names, (arm.home + 0.3).tolist(), strict=True)
+        )
+        (tmp_path / "pairs").mkdir()
+        names = ", ".join(arm.joint_names)
+        start = f"{{name: [{names}], position: {arm.home.tolist()}}}"
+        for number, place in ((1, 2.0), (2, 0.1)):
+            write(f"world:\n  collision_objects:\n{self.BOX % place}", f"pairs/scene{number}.yaml")
+            write(
+                f"start_state:\n  joint_state: {start}\n"
+                f"goal_constraints:\n- joint_constraints:\n{joints}",
+                f"pairs/request{number}.yaml",
+            )
+        return tmp_path / "pairs"
+
+    def test_folder(self, run, pairs):
+        answer = run("kinarm-problem", "import", "pairs", "--arm", "paper", "--out", "made")
+        assert (answer.status, answer.err) == (0, "")
+        first, second, summary = answer.out.splitlines()
+        assert first == "made/scene1.toml: start free, goal free"
+        assert "made/scene2.toml: start " in second
+        assert second.endswith(" touches box")
+        assert summary == "start and goal are free in 1 of 2 problems"
+        problem = ReachProblem.load("made/scene1.toml")
+        assert [body.name for body in problem.scene.obstacles] == ["box"]
+        assert run("kinarm-problem", "check", "made/scene1.toml", "--trials", 1).status == 0
+        again = run("kinarm-problem", "import", "pairs", "--arm", "paper", "--out", "made")
+        check_refused(again, "made/scene1.toml", "exists", "--overwrite")
+        touching = run("kinarm-problem", "check", "made/scene2.toml")
+        check_refused(touching, "task.starts[0] is in contact", "touches box")
+
+    def test_one_pair_with_a_mount(self, run, pairs):
+        files = "pairs/scene1.yaml", "pairs/request2.yaml"
+        where = "--position", 1, 0, 0.5, "--rpy", 0, 0, 1.5
+        answer = run("kinarm-problem", "import", *files, "--arm", "paper", "--out", ".", *where)
+        assert answer.status == 0
+        mount = ReachProblem.load("scene1.toml").scene.mount
+        assert (mount.position, mount.rpy) == ((1.0, 0.0, 0.5), (0.0, 0.0, 1.5))
+
+    @pytest.mark.parametrize(
+        ("words", "said"),
+        [
+            (["pairs"], ["--arm", "--out"]),
+            (["empty", "--arm", "paper", "--out", "made"], ["empty", "no folder"]),
+            (["pairs", "--arm", "nobody", "--out", "made"], ["'nobody'"]),
+            (["pairs/scene1.yaml", "gone", "--arm", "paper", "--out", "made"], ["'gone'"]),
+            (["pairs", "--arm", "panda.urdf", "--out", "made"], ["panda.urdf"]),
+        ],
+    )
+    def test_refusals(self, run, pairs, tmp_path, words, said):
+        check_refused(run("kinarm-problem", "import", *words), *said)
+        assert not list(tmp_path.glob("**/*.toml"))
+
+    def test_nothing_is_written_if_one_file_is_bad(self, run, pairs, tmp_path):
+        (pairs / "request2.yaml").unlink()
+        answer = run("kinarm-problem", "import", "pairs", "--arm", "paper", "--out", "made")
+        check_refused(answer, "request2.yaml", "No such file")
+        assert not list(tmp_path.glob("**/*.toml"))
