@@ -1,0 +1,57 @@
+"""Hashes of what kinarm computes, in a process that may take its processor for another one."""
+
+import os
+import subprocess
+import sys
+from collections.abc import Mapping
+from functools import cache
+
+COMPUTE_AND_PRINT = """
+import hashlib
+from dataclasses import replace
+import numpy as np
+from kinarm import Simulator
+from kinarm.policies import Oracle, load_policy, train_policy
+from kinarm.policies.recipes import recipe
+
+def show(*arrays):
+    print(hashlib.sha256(b"".join(np.asarray(array).tobytes() for array in arrays)).hexdigest())
+
+simulator = Simulator("both")
+starts, goals = simulator.sample(np.random.default_rng(0), 64)
+rollouts = simulator.rollout(load_policy("ppo-tuned-both-seed0"), starts, goals, record=True)
+show(starts, goals, rollouts.returns, rollouts.steps, rollouts.paths)
+world = simulator.world
+poses = world.poses(starts)
+pointing = world.inverse_kinematics(poses[:, :3, 3], [0, 0, -1])
+posed = world.inverse_kinematics(poses)
+show(poses, world.jacobians(starts), posed.configurations, pointing.configurations)
+show(*world.clearance(starts)[::2])
+solutions = Oracle("both").solve_batch(starts[:8], goals[:8])
+show(solutions.steps_lower_bound, solutions.actions, solutions.distance_lower_bound)
+for name, problem in (("paper", "right"), ("tuned", "both")):
+    state = train_policy(recipe("ars", name, problem=problem, iterations=10)).state
+    curve = np.array([point[:4] for point in state.curve])
+    show(state.theta, state.normalizer.mean, state.normalizer.squares, curve)
+small = dict(n_envs=50, n_steps=6, batch_size=100, n_epochs=2, iterations=3, net_arch=(40, 24))
+for name in ("paper", "tuned"):
+    state = train_policy(replace(recipe("ppo", name, problem="both", seed=1), **small)).state
+    show(state.parameters, state.first_moment, state.second_moment, state.episodes.q)
+"""
+
+
+def computed_bits(variables: Mapping[str, str]) -> list[str]:
+    """Compute in a process with other environment variables."""
+    command = [sys.executable, "-P", "-c", COMPUTE_AND_PRINT]
+    done = subprocess.run(
+        command, env=os.environ | variables, capture_output=True, text=True, check=True
+    )
+    found = done.stdout.split()
+    assert len(set(found)) == 8
+    return found
+
+
+@cache
+def usual_bits() -> list[str]:
+    """What this machine computes."""
+    return computed_bits({})
