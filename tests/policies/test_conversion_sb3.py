@@ -56,9 +56,9 @@ def normalized(policy="MlpPolicy", steps=60, **settings):
 
 @pytest.fixture(scope="module")
 def observations():
-    """What 10,000 arms see, and the simulator that they are of."""
+    """What 1000 arms see, and the simulator that they are of."""
     simulator = Simulator("right", threads=1)
-    return simulator.world.observe(*simulator.sample(np.random.default_rng(1), 10_000))
+    return simulator.world.observe(*simulator.sample(np.random.default_rng(1), 1000))
 
 
 def predictions(model, observations):
@@ -76,8 +76,9 @@ def check_same(model, policy, observations):
     assert expected.std(axis=0).min() > 1e-3
 
 
-@pytest.mark.parametrize("normalize", [False, True])
-@pytest.mark.parametrize("policy", MAKE)
+@pytest.mark.parametrize(
+    ("policy", "normalize"), [("MlpPolicy", True), ("MultiInputPolicy", False)]
+)
 @pytest.mark.parametrize("name", ["PPO", "A2C", "SAC", "TD3", "DDPG", "TQC"])
 def test_acts_as_the_model(name, policy, normalize, observations, tmp_path):
     env = normalized(policy) if normalize else None
