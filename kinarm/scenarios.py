@@ -7,7 +7,6 @@ from numpy.typing import NDArray
 
 from kinarm.errors import ProblemError, whole_number
 from kinarm.kernels.compiling import Array
-from kinarm.kernels.screening import deal, propose_starts, rejected_rows
 from kinarm.world import World
 
 START_ATTEMPTS = 2000
@@ -59,8 +58,8 @@ def draw_for_each(
     whole_number("count", count, 0)
     arm, task, n_actions = world.arm, world.problem.task, world.n_actions
     spread = task.start_spread if start_spread is None else start_spread
-    lower = arm.home + spread * (arm.lower - arm.home)
-    extent = spread * (arm.upper - arm.lower)
+    lower = (arm.home + spread * (arm.lower - arm.home))[:n_actions]
+    extent = (spread * (arm.upper - arm.lower))[:n_actions]
     goals = world.goals.at(_draw(rngs, [count] * len(rngs), 1 + len(world.goals.moving)))
     listed = world.starts
     starts = np.tile(arm.home, (len(goals), 1))
@@ -69,13 +68,15 @@ def draw_for_each(
         wanted = [len(pending)]
         if len(rngs) > 1:
             wanted = np.bincount(pending // max(count, 1), minlength=len(rngs)).tolist()
-        uniforms = _draw(rngs, wanted, n_actions)
+        uniforms, aims = _draw(rngs, wanted, n_actions), goals[pending]
         if len(listed):
-            starts[pending] = proposed = listed[(uniforms[:, 0] * len(listed)).astype(np.int64)]
+            starts[pending] = listed[(uniforms[:, 0] * len(listed)).astype(np.int64)]
         else:
-            proposed = propose_starts(pending, uniforms, lower, extent, starts)
-        tools, touching = world.screened(proposed, world.scenes_of(proposed, goals[pending]))
-        pending = rejected_rows(pending, goals, tools, touching, task.tolerance)
+            starts[pending, :n_actions] = lower + uniforms * extent
+        proposed = starts[pending]
+        tools, touching = world.screened(proposed, world.scenes_of(proposed, aims))
+        x, y, z = (tools - aims).T
+        pending = pending[touching | (np.sqrt(x * x + y * y + z * z) <= task.tolerance)]
         if pending.size == 0:
             shape = len(rngs), count
             return starts.reshape(*shape, arm.n_joints), goals.reshape(*shape, 3)
@@ -124,12 +125,14 @@ class ScenarioQueues:
         Parameters
         ----------
         rows, q, goal
-            As for `kinarm.kernels.screening.deal`.
+            The arms, and configurations [rad or m] and goals [m] of all arms.
         """
-        queues = self._taken, self._drawn, self._starts, self._goals
-        if not deal(rows, *queues, q, goal):
+        taken = self._taken[rows]
+        if (taken == self._drawn[rows]).any():
             self._draw()
-            deal(rows, *queues, q, goal)
+        places = taken % (2 * PREFETCHED)
+        q[rows], goal[rows] = self._starts[rows, places], self._goals[rows, places]
+        self._taken[rows] = taken + 1
 
     def _draw(self) -> None:
         """Draw scenarios for all arms with room."""
