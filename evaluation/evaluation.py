@@ -15,12 +15,7 @@ from kinarm.episodes import Outcome, Rollouts
 from kinarm.errors import InvalidInputError
 from kinarm.evaluation.bounds import MOST_BOUNDED, oracle_bounds
 from kinarm.evaluation.contestants import Contestant, Predictor, measure_holding
-from kinarm.evaluation.document import (
-    Failures,
-    Result,
-    TrialEnds,
-    TrialHolding,
-)
+from kinarm.evaluation.document import Failures, Result, TrialEnds, TrialHolding
 from kinarm.evaluation.estimates import estimate_metrics
 from kinarm.evaluation.finding import contestant_of
 from kinarm.evaluation.outcomes import Holding, Outcomes, failure_causes
@@ -89,7 +84,7 @@ class Evaluation:
         """Bodies that touched, per trial."""
         return self.trials.simulator.contact_pairs(self.rollouts)
 
-    def difference(self, other: "Faced") -> dict[str, Estimate]:
+    def difference(self: "Faced", other: "Faced") -> dict[str, Estimate]:
         """Figures of merit less those of another, by their name in `kinarm.evaluation.METRICS`.
 
         Intervals are about other trials, which both would face, and where training seeds are pooled
@@ -105,7 +100,12 @@ class Evaluation:
         InvalidInputError
             If it faced other trials; says what differs.
         """
-        return difference_between(self, other)
+        trials, others = self.members[0].trials, other.members[0].trials
+        if different := trials.first_difference(others):
+            raise InvalidInputError(
+                f"differences need the same trials, but in the second, {different}"
+            )
+        return estimate_metrics(outcomes_of(self.members), outcomes_of(other.members))
 
     @property
     def step_ratio(self) -> NDArray[np.float64]:
@@ -152,14 +152,6 @@ class Evaluation:
         name, problem = self.name, self.problem.name
         trials = f"{len(self.trials)} trials of {problem}"
         return f"Evaluation({name} on {trials}, success {self.success})"
-
-
-def difference_between(first: "Faced", second: "Faced") -> dict[str, Estimate]:
-    """Figures of merit of the first less those of the second, which must face its trials."""
-    trials, others = first.members[0].trials, second.members[0].trials
-    if different := trials.first_difference(others):
-        raise InvalidInputError(f"differences need the same trials, but in the second, {different}")
-    return estimate_metrics(outcomes_of(first.members), outcomes_of(second.members))
 
 
 def outcomes_of(members: Sequence[Evaluation]) -> Outcomes:

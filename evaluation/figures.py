@@ -13,7 +13,6 @@ from kinarm.evaluation.evaluation import Evaluation
 from kinarm.evaluation.selection import group_names
 
 if TYPE_CHECKING:
-    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#999999", "#000000")
@@ -40,8 +39,15 @@ def distance_histograms(evaluations: Sequence[Evaluation]) -> "Figure":
             if evaluation.problem.digest == digest:
                 series[label].append(evaluation.rollouts.distance)
         for number, (label, distances) in enumerate(series.items()):
-            if distances:
-                _stairs(axes, distances, edges, label, number)
+            if not distances:
+                continue
+            colour = COLOURS[number % len(COLOURS)]
+            dash = DASHES[number // len(COLOURS) % len(DASHES)]
+            shares = np.array([np.histogram(d, edges)[0] / len(d) for d in distances])
+            for share in shares if len(shares) > 1 else ():
+                axes.stairs(share, edges, color=colour, alpha=0.3, lw=0.8)
+            mean = shares.mean(axis=0)
+            axes.stairs(mean, edges, color=colour, linestyle=dash, lw=2, label=label)
         axes.axvline(problem.task.tolerance, color="#444444", linestyle=":", linewidth=1)
         axes.set(title=problem.name, xlabel="final distance to the goal [m]", xlim=(0, None))
         axes.set_ylim(0, None)
@@ -69,21 +75,6 @@ def panels_figure(
     for axes in panels.flat:
         axes.spines[["top", "right"]].set_visible(False)
     return figure, panels
-
-
-def _stairs(
-    axes: "Axes",
-    distances: Sequence[NDArray[np.float64]],
-    edges: NDArray[np.float64],
-    label: str,
-    number: int,
-) -> None:
-    """Draw the histograms of the seeds faintly and their mean boldly."""
-    colour, dash = COLOURS[number % len(COLOURS)], DASHES[number // len(COLOURS) % len(DASHES)]
-    shares = np.array([np.histogram(d, edges)[0] / len(d) for d in distances])
-    for share in shares if len(shares) > 1 else ():
-        axes.stairs(share, edges, color=colour, alpha=0.3, linewidth=0.8)
-    axes.stairs(shares.mean(axis=0), edges, color=colour, linestyle=dash, linewidth=2, label=label)
 
 
 def series_labels(evaluations: Sequence[Evaluation]) -> list[str]:

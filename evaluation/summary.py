@@ -19,12 +19,7 @@ from kinarm.evaluation.document import (
     WorstSeed,
 )
 from kinarm.evaluation.estimates import estimate_metrics
-from kinarm.evaluation.evaluation import (
-    Evaluation,
-    common_figures,
-    difference_between,
-    outcomes_of,
-)
+from kinarm.evaluation.evaluation import Evaluation, common_figures, outcomes_of
 from kinarm.evaluation.selection import check_names, group_names, is_called
 from kinarm.evaluation.statistics import Estimate
 from kinarm.policies.provenance import package_versions, source_commit
@@ -48,9 +43,7 @@ class PooledEvaluation:
         """Figures of merit over all seeds; intervals are over seeds and trials."""
         return estimate_metrics(outcomes_of(self.members))
 
-    def difference(self, other: "Faced") -> dict[str, Estimate]:
-        """Figures of merit less those of another; see `Evaluation.difference`."""
-        return difference_between(self, other)
+    difference = Evaluation.difference
 
     @property
     def worst(self) -> Evaluation:

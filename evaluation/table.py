@@ -121,20 +121,19 @@ def all_columns() -> list[Column[Row]]:
     for name, metric in METRICS.items():
         columns.append(metric_column(name, attrgetter("metrics")))
         if name == "success":
-            columns.append(_seeds_column())
+            columns.append(
+                Column(
+                    "seeds",
+                    lambda row: Cell(
+                        str(len(row.members)) if isinstance(row, PooledResult) else ""
+                    ),
+                    meaning="trainings of a recipe that differ in their seed alone",
+                    priority=SEEDS_PRIORITY,
+                )
+            )
         if metric.spread_heading:
             columns.append(spread_column(name))
     return columns
-
-
-def _seeds_column() -> Column[Row]:
-    """The column of how many training seeds a row holds; empty without them."""
-    return Column(
-        "seeds",
-        lambda row: Cell(str(len(row.members)) if isinstance(row, PooledResult) else ""),
-        meaning="trainings of a recipe that differ in their seed alone",
-        priority=SEEDS_PRIORITY,
-    )
 
 
 def metric_columns() -> list[Column[Row]]:

@@ -222,25 +222,19 @@ def run_command(prog: str, command: Callable[[], None]) -> NoReturn:
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors="backslashreplace")  # letters that an encoding lacks
+    status = 0
     begin()
     try:
-        status = _run(command)
+        try:
+            command()
+        except SystemExit as leaving:
+            status = leaving.code if isinstance(leaving.code, int) else 0
+        sys.stdout.flush()
         end()
     except BaseException as error:
         end()
         status = _status_of(prog, error)
     sys.exit(status)
-
-
-def _run(command: Callable[[], None]) -> int:
-    """Run a command and flush what it printed."""
-    status = 0
-    try:
-        command()
-    except SystemExit as leaving:
-        status = leaving.code if isinstance(leaving.code, int) else 0
-    sys.stdout.flush()
-    return status
 
 
 def _status_of(prog: str, error: BaseException) -> int:

@@ -258,7 +258,14 @@ def load_archive(
     """
     name, wanted = repr(str(path)), f"kinarm-{kind.replace(' ', '-')}"
     with reading(name, kind, error), Path(path).open("rb") as file:
-        content = _arrays(file, unless) if file.read(2) in (b"", b"PK") else {}
+        content = dict[str, NDArray[Any]]()
+        if file.read(2) in (b"", b"PK"):
+            file.seek(0)
+            with warnings.catch_warnings(action="ignore"), np.load(file, allow_pickle=False) as npz:
+                content = {each: npz[each] for each in npz.files if not each.startswith(unless)}
+        for each, array in content.items():
+            if not isinstance(array, np.ndarray) or array.dtype.kind not in KINDS:
+                raise ValueError(f"{each} is no array of numbers or texts")
         if "format" not in content:
             raise error(f"{name} is not a kinarm {kind}")
         given = str(content.pop("format"))
@@ -274,16 +281,6 @@ def load_archive(
         if not isinstance(header, dict):
             raise error(f"{name} is not a complete kinarm {kind}: its header is no table")
         return Archive(header, content)
-
-
-def _arrays(file: IO[bytes], unless: tuple[str, ...]) -> dict[str, NDArray[Any]]:
-    file.seek(0)
-    with warnings.catch_warnings(action="ignore"), np.load(file, allow_pickle=False) as content:
-        arrays = {name: content[name] for name in content.files if not name.startswith(unless)}
-    for name, array in arrays.items():
-        if not isinstance(array, np.ndarray) or array.dtype.kind not in KINDS:
-            raise ValueError(f"{name} is no array of numbers or texts")
-    return arrays
 
 
 @contextmanager

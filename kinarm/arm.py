@@ -96,13 +96,17 @@ class Arm:
         description = read_urdf(wanted)
         model = _build_model(description, wanted.velocity_limits)
         chain = Chain.from_model(model, description.tool_frame)
+        home = np.clip(np.zeros(chain.n_joints), chain.lower, chain.upper)
+        if wanted.home is not None:
+            home = finite_array("home", wanted.home, home.shape)
+            home = within_limits("home", home, chain, tuple(model.names)[1:])
         loaded = cls(
             specification=specification,
             description=description,
             model=model,
             geometry=_build_shapes(description, model, wanted),
             n_actuated=_n_actuated(wanted.actuated, model, chain, description),
-            home=_home(wanted.home, chain, tuple(model.names[1:])),
+            home=home,
             held_bodies=wanted.held_bodies or (),
             allowed_contacts=wanted.allowed_contacts or (),
             chain=chain,
@@ -321,10 +325,3 @@ def _n_actuated(
             f"{', '.join(names)}; got {', '.join(named) or 'none'} (held locks others)"
         )
     return len(named)
-
-
-def _home(home: ArrayLike | None, chain: Chain, names: tuple[str, ...]) -> NDArray[np.float64]:
-    """Check a home configuration, or take zero clipped to the limits."""
-    if home is None:
-        return np.clip(np.zeros(chain.n_joints), chain.lower, chain.upper)
-    return within_limits("home", finite_array("home", home, (chain.n_joints,)), chain, names)

@@ -263,7 +263,10 @@ def record_path(
         If the first configuration touches something.
     """
     world = problem if isinstance(problem, World) else World(problem)
-    points = _within_limits(world, path)
+    points = finite_array("path", path, (None, world.arm.n_joints))
+    if len(points) == 0:
+        raise InvalidInputError("path holds no configuration")
+    points = within_limits("path", points, world.arm.chain, world.arm.joint_names)
     aim = world.poses(points[-1])[:3, 3] if goal is None else finite_array("goal", goal, (3,))
     world = world.in_scene(points[0], aim)
     if (pair := world.contact_pair(points[0])) is not None:
@@ -289,14 +292,6 @@ def record_path(
         contact_point=contact.point if contact else None,
         refused=contact.configuration if contact else None,
     )
-
-
-def _within_limits(world: World, path: ArrayLike) -> NDArray[np.float64]:
-    """Check the configurations of a path."""
-    points = finite_array("path", path, (None, world.arm.n_joints))
-    if len(points) == 0:
-        raise InvalidInputError("path holds no configuration")
-    return within_limits("path", points, world.arm.chain, world.arm.joint_names)
 
 
 def _stepwise(world: World, points: NDArray[np.float64]) -> NDArray[np.float64]:

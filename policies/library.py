@@ -95,7 +95,10 @@ def policy_files(name_or_file: str | Path, problem: ProblemLike | None = None) -
     if files:
         return files
     if is_folder(path):
-        return _files_in(path)
+        found = [each for each in path.glob("*.npz") if not each.name.endswith(CHECKPOINT)]
+        if not found:
+            raise InvalidInputError(f"there is no policy (.npz) in the folder {str(path)!r}")
+        return tuple(_in_order(found))
     if is_file(path) or path.suffix == ".npz" or path.parent != Path():
         return (path,)
     groups = dict.fromkeys(group_of(name) for name in policy_names())
@@ -107,14 +110,6 @@ def models_in(path: Path) -> list[Path]:
     if not is_folder(path) or any(path.glob("*.npz")):
         return []
     return _in_order(path.glob("*.zip"))
-
-
-def _files_in(folder: Path) -> tuple[Path, ...]:
-    """Policies in a folder, without checkpoints."""
-    found = [path for path in folder.glob("*.npz") if not path.name.endswith(CHECKPOINT)]
-    if not found:
-        raise InvalidInputError(f"there is no policy (.npz) in the folder {str(folder)!r}")
-    return tuple(_in_order(found))
 
 
 def _in_order(paths: Iterable[Path]) -> list[Path]:

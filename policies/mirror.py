@@ -63,7 +63,11 @@ def mirror_findings(world: World) -> dict[str, str]:
     reason, or an empty text.
     """
     arm = world.arm
-    axes, moved = _axis_signs(world)[: arm.n_actuated], slice(arm.n_actuated)
+    data, moved = arm.model.createData(), slice(arm.n_actuated)
+    pin.forwardKinematics(arm.model, data, np.zeros(arm.n_joints))
+    turned = zip(list(data.oMi)[1:], arm.chain.axis, strict=True)
+    across = np.array([abs((pose.rotation @ axis)[1]) > 0.5 for pose, axis in turned])
+    axes = np.where(across ^ arm.chain.prismatic, 1.0, -1.0)[moved]
     q = random_configurations(world.contact_model, MIRRORED_CONFIGURATIONS)
     beyond = _beyond_limits(axes, arm.lower[moved], arm.upper[moved])
     uneven = [arm.joint_names[joint] for joint in np.flatnonzero(beyond)]
@@ -85,16 +89,6 @@ def mirror_findings(world: World) -> dict[str, str]:
     except InvalidInputError:
         found["observations"] = "joint frames are not their image"
     return found
-
-
-def _axis_signs(world: World) -> Array:
-    """Signs of the joints in the reflection, shape (n_joints,)."""
-    model, chain = world.arm.model, world.arm.chain
-    data = model.createData()
-    pin.forwardKinematics(model, data, np.zeros(model.nq))
-    turned = zip(list(data.oMi)[1:], chain.axis, strict=True)
-    across = np.array([abs((pose.rotation @ axis)[1]) > 0.5 for pose, axis in turned])
-    return np.where(across ^ chain.prismatic, 1.0, -1.0)
 
 
 @lru_cache(maxsize=8)

@@ -53,7 +53,13 @@ def write_all(study: "Study", command: str = "") -> Path:
     write_csv(folder / "runs.csv", study.rows())
     write_csv(folder / "curves.csv", table.curve_rows(study))
     if find_spec("pyarrow") is not None:
-        _write_parquet(folder / "runs.parquet", study.table())
+        import pyarrow
+        import pyarrow.parquet
+
+        rows = study.table()
+        arrow = pyarrow.table({name: rows[name] for name in rows.dtype.names or ()})
+        path = folder / "runs.parquet"
+        write_atomically(path, lambda file: pyarrow.parquet.write_table(arrow, file))
     drawings = {}
     for name, figure in draw_all(study).items():
         _, drawn = save_figure(figure, folder, name)
@@ -76,14 +82,6 @@ def write_csv(path: Path, rows: list[dict[str, Any]]) -> None:
         for row in rows
     ]
     write_text(path, csv_text(texts))
-
-
-def _write_parquet(path: Path, rows: NDArray[Any]) -> None:
-    import pyarrow
-    import pyarrow.parquet
-
-    arrow = pyarrow.table({name: rows[name] for name in rows.dtype.names or ()})
-    write_atomically(path, lambda file: pyarrow.parquet.write_table(arrow, file))
 
 
 def results_document(study: "Study", command: str) -> dict[str, Any]:
@@ -247,7 +245,12 @@ def _draw_effect(axes: "Axes", study: "Study", field: str, runs: ByValue) -> Non
             shares = [study.finished[run].outcomes.success.mean() for run in same]
             axes.plot([place] * len(same), shares, "o", color=COLOURS[0], alpha=0.5, ms=4)
         else:
-            mean = _mean_success(study, same)
+            by_seed: dict[int, list[NDArray[np.float64]]] = {}
+            for run in same:
+                hits = study.finished[run].outcomes.success.astype(np.float64)
+                by_seed.setdefault(run.config.seed, []).append(hits)
+            seeds = np.array([np.mean(each, axis=0) for each in by_seed.values()])
+            mean = share_over_seeds(seeds)
             value, bars = mean.value or 0.0, _whiskers(mean)
             axes.errorbar(place, value, yerr=bars, fmt="o", color=COLOURS[0], capsize=3)
     if not drawn and (not numeric or len(runs) <= 6):
@@ -255,15 +258,6 @@ def _draw_effect(axes: "Axes", study: "Study", field: str, runs: ByValue) -> Non
         axes.minorticks_off()
     axes.margins(x=0.2)
     axes.set(title=shorter(field), ylim=(0, 1.02))
-
-
-def _mean_success(study: "Study", runs: Sequence[Run]) -> Estimate:
-    """Mean success, with its interval over seeds and trials."""
-    by_seed: dict[int, list[NDArray[np.float64]]] = {}
-    for run in runs:
-        hits = study.finished[run].outcomes.success.astype(np.float64)
-        by_seed.setdefault(run.config.seed, []).append(hits)
-    return share_over_seeds(np.array([np.mean(each, axis=0) for each in by_seed.values()]))
 
 
 def _whiskers(estimate: Estimate) -> list[list[float]]:

@@ -29,8 +29,8 @@ from kinarm.policies.policy import Policy, policy_content, policy_of_content
 ARCHIVE = ("study run", 1)
 """Kind and version of the files."""
 
-STATE, POLICY, OUTCOMES = "state", "policy.", "outcomes."
-"""Beginnings of names of arrays; states are in files of version 1.0.0."""
+POLICY, OUTCOMES = "policy.", "outcomes."
+"""Beginnings of names of arrays."""
 
 
 class TrialOutcomes(NamedTuple):
@@ -210,9 +210,9 @@ def _run_content(run: Run, end: Start) -> bytes:
 
 
 @contextmanager
-def _content_of(path: Path, run: Run, unless: tuple[str, ...]) -> Iterator[Archive]:
+def _content_of(path: Path, run: Run, unless: str) -> Iterator[Archive]:
     """Header and arrays of a training's file, ``unless`` their names begin so."""
-    content = load_archive(path, *ARCHIVE, InvalidInputError, unless=unless)
+    content = load_archive(path, *ARCHIVE, InvalidInputError, unless=(unless,))
     with reading(repr(str(path)), ARCHIVE[0], InvalidInputError):
         if content.header["settings"] != run.settings:
             raise InvalidInputError(f"{str(path)!r} is of another training")
@@ -221,7 +221,7 @@ def _content_of(path: Path, run: Run, unless: tuple[str, ...]) -> Iterator[Archi
 
 def load_policy(path: Path, run: Run) -> Policy:
     """Read the policy of a finished training."""
-    with _content_of(path, run, (STATE, OUTCOMES)) as (header, arrays):
+    with _content_of(path, run, OUTCOMES) as (header, arrays):
         archive = Archive(header["policy"], _parts(arrays, POLICY))
         return policy_of_content(archive, repr(str(path)))
 
@@ -236,7 +236,7 @@ def load_run(path: Path, run: Run, clock: Clock) -> TrainedRun:
     clock : Clock
         How long it took.
     """
-    with _content_of(path, run, (STATE, POLICY)) as (header, arrays):
+    with _content_of(path, run, POLICY) as (header, arrays):
         return TrainedRun(
             curve=rebuilt(tuple[CurvePoint, ...], "curve", arrays),
             last=CurvePoint(**header["last"]),

@@ -1,7 +1,7 @@
 """A study: an experiment in its folder, how to run it, and its results."""
 
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import replace
 from functools import cached_property, partial
@@ -324,12 +324,11 @@ class Study:
     def table(self) -> NDArray[Any]:
         """The `rows` as a structured array of numbers and texts."""
         rows = self.rows()
-        columns = {name: _column([row[name] for row in rows]) for name in (rows[0] if rows else ())}
+        columns = {}
+        for name in rows[0] if rows else ():
+            values = [row[name] for row in rows]
+            if not all(isinstance(each, bool | int | float) for each in values):
+                values = ["" if each is None else shown(each) for each in values]
+            columns[name] = np.array(values)
         kinds = [(name, column.dtype) for name, column in columns.items()]
         return np.array([*zip(*columns.values(), strict=True)], dtype=kinds)
-
-
-def _column(values: Sequence[Any]) -> NDArray[Any]:
-    """Values as an array of numbers, or else of texts."""
-    numbers = all(isinstance(each, bool | int | float) for each in values)
-    return np.array(values if numbers else ["" if v is None else shown(v) for v in values])

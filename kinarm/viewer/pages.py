@@ -184,7 +184,30 @@ def replay_page(
         raise InvalidInputError(
             f"there must be a group for each recording: {len(groups)} for {len(chosen)}"
         )
-    page = ReplayPage(_replay_html(chosen, ghosts, groups, heading))
+    problem = chosen[0].problem
+    arm, scene, drawn = problem.load_arm(), problem.scene, DrawnScene()
+    trials = list(zip(chosen, ghosts, strict=True)) if ghosts else [(run,) for run in chosen]
+    policies = dict.fromkeys(run.policy for runs in trials for run in runs)
+    draw_stage(drawn.window, arm, scene)
+    draw_goal(drawn.window["goal"], problem)
+    for number, runs in enumerate(trials):
+        episode = runs[0].states[0], runs[0].goal
+        draw_random_bodies(drawn.window[f"trials/{number}"], scene, arm, *episode)
+        for name, run in zip(("run", "ghost"), runs, strict=False):
+            points = np.array([arm.tool_position(state) for state in run.states])
+            way = drawn.window[f"trials/{number}/{name}"]
+            draw_trace(way, points, run.outcome, stage_scale(arm, scene))
+    data = {
+        **arm_data(arm, scene),
+        "traceIndices": 6 * TRACE_SIDES,
+        "colours": {name: f"#{colour:06x}" for name, colour in OUTCOME_COLOURS.items()},
+        "trials": [_trial_data(runs) for runs in trials],
+        "groups": list(groups),
+        "heading": heading,
+    }
+    title = f"{' and '.join(policies)} · kinarm replay"
+    scripts = ("replay_stage", "trial_list", "player")
+    page = ReplayPage(page_html("player", title, drawn.content, data, scripts))
     if path is not None:
         page.save(path)
     return page
@@ -233,39 +256,6 @@ def _check_recordings(recordings: Sequence[Recording], ghosts: Sequence[Recordin
                 f"trial {recording.trial} of {recording.policy!r} and trial {ghost.trial} of "
                 f"{ghost.policy!r} differ in start or goal: they cannot be compared"
             )
-
-
-def _replay_html(
-    recordings: Sequence[Recording],
-    ghosts: Sequence[Recording],
-    groups: Sequence[str],
-    heading: str,
-) -> str:
-    """Page of recordings that can share one."""
-    arm, scene = recordings[0].problem.load_arm(), recordings[0].problem.scene
-    trials = list(zip(recordings, ghosts, strict=True)) if ghosts else [(r,) for r in recordings]
-    policies = dict.fromkeys(run.policy for runs in trials for run in runs)
-    drawn, problem = DrawnScene(), recordings[0].problem
-    draw_stage(drawn.window, arm, scene)
-    draw_goal(drawn.window["goal"], problem)
-    for number, runs in enumerate(trials):
-        episode = runs[0].states[0], runs[0].goal
-        draw_random_bodies(drawn.window[f"trials/{number}"], scene, arm, *episode)
-        for name, run in zip(("run", "ghost"), runs, strict=False):
-            points = np.array([arm.tool_position(state) for state in run.states])
-            way = drawn.window[f"trials/{number}/{name}"]
-            draw_trace(way, points, run.outcome, stage_scale(arm, scene))
-    data = {
-        **arm_data(arm, scene),
-        "traceIndices": 6 * TRACE_SIDES,
-        "colours": {name: f"#{colour:06x}" for name, colour in OUTCOME_COLOURS.items()},
-        "trials": [_trial_data(runs) for runs in trials],
-        "groups": list(groups),
-        "heading": heading,
-    }
-    title = f"{' and '.join(policies)} · kinarm replay"
-    scripts = ("replay_stage", "trial_list", "player")
-    return page_html("player", title, drawn.content, data, scripts)
 
 
 def _trial_data(runs: Sequence[Recording]) -> dict[str, Any]:
@@ -320,16 +310,7 @@ def arm_page(
     """
     if not isinstance(arm, Arm):
         arm = Arm.load(arm).placed(scene.mount.position, scene.mount.rotation)
-    page = ArmPage(_arm_html(arm, scene))
-    if path is not None:
-        page.save(path)
-    return page
-
-
-def _arm_html(arm: Arm, scene: Scene) -> str:
-    """Page of an arm in a scene, with shapes and tested pairs."""
-    model = ContactModel.build(arm, scene)
-    drawn = DrawnScene()
+    model, drawn = ContactModel.build(arm, scene), DrawnScene()
     frames = draw_stage(drawn.window, arm, scene)
     for number, part in enumerate(collision_parts(arm)):
         put(frames[part.joint][f"shape_{number}"], SHAPE, part.mesh)
@@ -344,7 +325,10 @@ def _arm_html(arm: Arm, scene: Scene) -> str:
     }
     data["scale"] *= NEARER
     title = f"{arm.name} · kinarm arm"
-    return page_html("arm_page", title, drawn.content, data, ("contact", "arm_page"))
+    page = ArmPage(page_html("arm_page", title, drawn.content, data, ("contact", "arm_page")))
+    if path is not None:
+        page.save(path)
+    return page
 
 
 def _shape_data(shape: pin.GeometryObject) -> dict[str, Any]:

@@ -22,12 +22,13 @@ from kinarm.policies.conversion.layers import (
     normalization,
     policy_of_pieces,
 )
-from kinarm.policies.conversion.models import SB3Model, sb3_model
-from kinarm.policies.conversion.statistics import (
+from kinarm.policies.conversion.models import (
     NONE,
+    SB3Model,
     check_not_normalized,
     find_vec_normalize,
     load_vec_normalize,
+    sb3_model,
 )
 from kinarm.problem import ProblemLike, ReachProblem
 from kinarm.simulator import Simulator

@@ -113,8 +113,13 @@ class PPOTraining:
     def iterate(self, state: PPOState) -> PPOState:
         """One rollout and one update."""
         began = time.perf_counter()
-        self._check(state)
         config, networks, arms = self.config, self.networks, self.arms
+        sizes = (len(state.parameters), len(state.episodes.goal))
+        if sizes != (expected := (networks.n_parameters, config.n_envs)):
+            raise InvalidInputError(
+                f"the state to resume has {sizes[0]} parameters and {sizes[1]} arms, "
+                f"not {expected[0]} and {expected[1]}"
+            )
         done = state.iteration / config.iterations
         rng, scenarios = seed_iteration(config.seed, state.iteration + 1)
         networks.load(state.parameters)
@@ -154,13 +159,3 @@ class PPOTraining:
             curve=(*state.curve, point),
             simulator_time=state.simulator_time + arms.time,
         )
-
-    def _check(self, state: PPOState) -> None:
-        """Refuse a state of another training."""
-        sizes = (len(state.parameters), len(state.episodes.goal))
-        expected = (self.networks.n_parameters, self.config.n_envs)
-        if sizes != expected:
-            raise InvalidInputError(
-                f"the state to resume has {sizes[0]} parameters and {sizes[1]} arms, "
-                f"not {expected[0]} and {expected[1]}"
-            )

@@ -25,8 +25,7 @@ from kinarm.evaluation import EvaluationDocument, Study, oracle_bounds
 from kinarm.evaluation.finding import find_contestants
 from kinarm.meshes import hulls_of_mesh
 from kinarm.policies import Demonstrations, Policy, load_checkpoint, recipe
-from kinarm.policies.conversion.models import sb3_model
-from kinarm.policies.conversion.statistics import load_vec_normalize
+from kinarm.policies.conversion.models import load_vec_normalize, sb3_model
 from kinarm.policies.learners import state_policy
 from kinarm.problem import ReachProblem, find_scene, find_task
 from kinarm.recording import load_recordings
