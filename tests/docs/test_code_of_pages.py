@@ -28,6 +28,7 @@ EXCEPTIONS = {
     r"kinarm-train ppo --recipe best .*(ur5|so101)": "does as the line about the Panda",
     r"kinarm-eval --policy (ur5|so101) ": "needs what those lines train",
     r"pip install": "changes the installation",
+    r"pip download|tar -x|kinarm-problem import .*ur5": "needs a download; tests/kinarm",
     r"\. \.venv/bin/activate": "changes the shell; tests/packaging/first_steps.py",
     r"python -m tests\.campaign": "takes hours; tests/campaign runs a share of each",
     r"python -m docs\.transfer": "trains for an hour; tests/frozen",

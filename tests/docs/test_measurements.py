@@ -1,6 +1,7 @@
 """The scripts in ``docs/measurements``: MuJoCo's arm is kinarm's, and operations are counted."""
 
 import math
+import tarfile
 from xml.etree import ElementTree
 
 import numpy as np
@@ -8,9 +9,10 @@ import pytest
 from known_arms import INSTALLED
 from numba import njit
 
-from docs.measurements import limits
+from docs.measurements import limits, motionbenchmaker
 from docs.measurements.counting import OperationCounter
 from docs.measurements.mjcf import mjcf
+from kinarm.arm import Arm
 from kinarm.kernels.lanes import LANES, as_lanes
 from kinarm.kernels.network import affine_layer
 from kinarm.policies import load_policy
@@ -135,6 +137,37 @@ class TestMuJoCo:
         volumes = [np.pi * 0.1**2 * 0.3, 4 / 3 * np.pi * 0.1**3, 0.1 * 0.2 * 0.3]
         masses = [model.body(f"link{k}").mass[0] for k in (1, 2, 3)]
         assert masses == pytest.approx(1000 * np.array(volumes))
+
+
+class TestMotionBenchMaker:
+    SCENE = (
+        "world:\n  collision_objects:\n"
+        "  - {id: can, primitives: [{type: cylinder, dimensions: [0.2, 0.05]}],\n"
+        "     primitive_poses: [{position: [0.82, 0.13, 0.0], orientation: [0, 0, 0, 1]}]}\n"
+    )
+    """A can around the wrist of a UR5 at zero."""
+
+    @INSTALLED
+    def test_arm_touches_a_can_at_the_goal_alone(self, tmp_path, capsys):
+        pytest.importorskip("yaml")
+        source = Arm.load("ur5").urdf_path
+        package = "package://example-robot-data/robots/ur_description/meshes"
+        (tmp_path / "ur5.urdf").write_text(source.read_text().replace(package, "meshes"))
+        (tmp_path / "ur5.srdf").write_text('<robot name="ur5"/>')
+        (tmp_path / "meshes").symlink_to(source.parents[1] / "meshes")
+        names, upright = Arm.load("ur5").joint_names, [0, -1.57, 0, 0, 0, 0]
+        joints = [f"{{joint_name: {name}, position: 0}}" for name in names]
+        scenes = tmp_path / "problems" / "cans_ur5"
+        scenes.mkdir(parents=True)
+        (scenes / "scene0001.yaml").write_text(self.SCENE)
+        (scenes / "request0001.yaml").write_text(
+            f"start_state: {{joint_state: {{name: [{', '.join(names)}], position: {upright}}}}}\n"
+            f"goal_constraints: [{{joint_constraints: [{', '.join(joints)}]}}]\n"
+        )
+        with tarfile.open(tmp_path / "problems.tar.bz2", "w:bz2") as archive:
+            archive.add(tmp_path / "problems", "problems")
+        motionbenchmaker.main(tmp_path)
+        assert "| `cans_ur5` | 1, 0, 0 | 1, 0, 0 | " in capsys.readouterr().out
 
 
 class TestPeers:
