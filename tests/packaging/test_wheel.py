@@ -33,7 +33,8 @@ rollouts = simulator.rollout_actions(np.ones((3, 64, 5)), starts, goals)
 json.dump({
     "files": [m.__file__ for m in (kinarm, kinarm.data, kinarm.evaluation, kinarm.policies)],
     "path": list(kinarm.__path__),
-    "arms": {name: Arm.load(name).digest for name in arm_names()},
+    "arms": list(arm_names()),
+    "digest": Arm.load("paper").digest,
     "policies": list(policy_names()),
     "distance": rollouts.distance.tolist(),
 }, sys.stdout)
@@ -72,10 +73,11 @@ def target(wheel: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("target")
     options = ("--no-deps", "--no-index", "--no-compile", "--target")
     call(*PIP, "install", *options, folder, wheel, cwd=folder)
-    for file in (ROOT / "kinarm").rglob("*.nb[ci]"):
-        copied = folder / file.relative_to(ROOT)
-        copied.parent.mkdir(exist_ok=True)
-        shutil.copyfile(file, copied)
+    for source, place in (("kinarm", "kinarm"), ("policies", "kinarm/policies")):
+        for file in (ROOT / source).rglob("*.nb[ci]"):
+            copied = folder / place / file.relative_to(ROOT / source)
+            copied.parent.mkdir(exist_ok=True)
+            shutil.copyfile(file, copied)
     return folder
 
 
@@ -116,7 +118,8 @@ def test_it_works_from_where_it_was_installed_as_the_clone_does(target, tmp_path
     used = json.loads(call(sys.executable, "-c", USE_IT, cwd=tmp_path, env=environment(target)))
     assert all(Path(file).is_relative_to(target) for file in used["files"])
     assert used["path"] == [str(target / "kinarm")]
-    assert used["arms"] == {name: Arm.load(name).digest for name in arm_names()}
+    assert used["arms"] == list(arm_names())
+    assert used["digest"] == Arm.load("paper").digest
     assert used["policies"] == list(policy_names())
     simulator = Simulator("both")
     starts, goals = simulator.sample(np.random.default_rng(0), 3)
