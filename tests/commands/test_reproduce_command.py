@@ -68,15 +68,8 @@ class TestQuick:
             assert (folder / f"{figure}.png").read_bytes().startswith(b"\x89PNG")
             assert b"</svg>" in (folder / f"{figure}.svg").read_bytes()
 
-    def test_again_trains_nothing_and_writes_the_same(self, quick, run_outside):
-        folder, _ = quick
-        runs = {path: path.stat().st_mtime_ns for path in (folder / "runs").iterdir()}
-        before = contents(folder)
-        assert run_outside("kinarm-reproduce", *QUICK, cwd=folder.parent).status == 0
-        assert contents(folder) == before
-        assert {path: path.stat().st_mtime_ns for path in (folder / "runs").iterdir()} == runs
-
     def test_goes_on_where_it_stopped_with_any_executor(self, quick, tmp_path):
+        """What is there is not trained again, and the same is written."""
         folder = tmp_path / "copy"
         shutil.copytree(quick[0], folder)
         first, second, *_ = sorted((folder / "runs").iterdir())

@@ -188,6 +188,7 @@ def workers(process: subprocess.Popen) -> list[int]:
     return found
 
 
+@pytest.mark.slow
 def test_ctrl_c_and_lost_workers_keep_every_seed_and_say_how_to_go_on(command, tmp_path):
     folder = tmp_path / "right"
     process = start(command, folder)

@@ -90,21 +90,15 @@ TOYS = {
 }
 
 
-def test_experiments_train_it_in_other_processes(
+def test_experiments_train_it_in_other_processes_and_a_column_stands_in_one_place(
     toy: None, folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("PYTHONPATH", os.pathsep.join([str(folder), str(ROOT)]))
+    monkeypatch.setattr(table, "COLUMNS", table.COLUMNS)
+    exec(BLOCKS["column"], {})
     study = Study(TOYS, folder / "study").run(jobs=2)
     assert [group.entry.name for group in study.groups()] == ["toy", "by module"]
     assert len(study) == 4
-
-
-def test_a_column_of_the_page_stands_in_one_place(
-    toy: None, folder: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(table, "COLUMNS", table.COLUMNS)
-    exec(BLOCKS["column"], {})
-    study = Study({**TOYS, "seeds": 1}, folder / "study").run(jobs=1)
     write_all(study)
     (shown, _) = (table.group_row(group)[-1] for group in study.groups())
     for name in ("index.html", "RESULTS.md"):
