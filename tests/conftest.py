@@ -1,6 +1,7 @@
 """Shared fixtures: the shipped arms, robots written on the spot, and simulators of both."""
 
 import os
+import sys
 from collections.abc import Callable, Iterator, Sequence
 from functools import partial
 from pathlib import Path
@@ -12,6 +13,7 @@ from mesh_files import CUBE_CORNERS, write_obj, write_stl
 from random_scenes import random_scene
 
 from kinarm.arm import Arm
+from kinarm.kernels.compiling import KernelCompiler
 from kinarm.problem import ReachProblem
 from kinarm.simulator import Simulator
 
@@ -113,13 +115,16 @@ def pytest_configure(config: pytest.Config) -> None:
         config.pluginmanager.register(Skipped(config))
 
 
+UNTRACED = {"docs", "frozen", "golden", "interop", "kernels", "packaging"}
+"""Folders of tests that repeat at length what others cover, as slow tests do.
+
+Tracing takes half as long again.
+"""
+
+
 @pytest.hookimpl(trylast=True)
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Begin with the files that take long, so that no worker ends alone with one of them.
-
-    Slow tests repeat at length what others cover: they are not traced, which would take half as
-    long again.
-    """
+    """Begin with the files that take long, so that no worker ends alone with one of them."""
     slow = {item for item in items if item.get_closest_marker("slow")}
     if config.getoption("rest"):
         skipped = tuple(config.cache.get(SKIPPED, []))
@@ -130,8 +135,27 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
     items.sort(key=lambda item: item.path not in files)
     if config.pluginmanager.hasplugin("_cov"):
         for item in items:
-            if item in slow:
+            folders = item.path.relative_to(Path(__file__).parent).parts
+            if item in slow or not UNTRACED.isdisjoint(folders):
                 item.add_marker("no_cover")
+
+
+@pytest.fixture(scope="session", autouse=True)
+def _untraced_compiling() -> Iterator[None]:
+    """Numba compiles without being traced."""
+    compile_traced = KernelCompiler.compile_extra
+
+    def compile_extra(self: KernelCompiler, function: Callable[..., object]) -> object:
+        tracer = sys.gettrace()
+        sys.settrace(None)
+        try:
+            return compile_traced(self, function)
+        finally:
+            sys.settrace(tracer)
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(KernelCompiler, "compile_extra", compile_extra)
+        yield
 
 
 @pytest.fixture(scope="session", autouse=True)
