@@ -7,14 +7,11 @@ import numpy as np
 import pytest
 
 from docs.transfer import reflection
-from docs.transfer.reflection import reflection_of, with_mirror
-from docs.transfer.study import (
-    SOURCE,
-    targets,
-)
+from docs.transfer.reflection import reflection_of
+from docs.transfer.study import targets
 from kinarm.evaluation.trials import trial_set
 from kinarm.policies import load_policy, recipe, train_policy
-from kinarm.policies.mirror import find_mirror, missing_mirror
+from kinarm.policies.mirror import missing_mirror
 from kinarm.policies.policy import Layer
 from kinarm.problem import PROBLEMS, ReachProblem, problem_names
 
@@ -50,18 +47,6 @@ def test_without_a_mirror_they_do_not(policies, monkeypatch):
         found = reflection_of(policy, trial_set(PROBLEMS["both"], 100, 3))
         assert found["differing"] > 10
         assert found["deviation"] > 0.1
-
-
-def test_on_the_left_nothing_changes(policies):
-    trials = trial_set(SOURCE, 100, 4)
-    mirror = find_mirror(trials.simulator.world)
-    for policy in policies:
-        plain, other = (
-            trials.simulator.rollout(each, trials.starts, trials.goals, record=True)
-            for each in (policy, with_mirror(policy, mirror))
-        )
-        np.testing.assert_array_equal(plain.steps, other.steps)
-        np.testing.assert_allclose(plain.paths, other.paths, rtol=0, atol=1e-12)
 
 
 def test_a_symmetric_training_is_one_whose_policy_gets_a_mirror():
