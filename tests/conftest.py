@@ -10,10 +10,10 @@ import pytest
 from hanging_chain import hanging_chain
 from hypothesis import settings
 from mesh_files import CUBE_CORNERS, write_obj, write_stl
+from numba.core.compiler import CompilerBase
 from random_scenes import random_scene
 
 from kinarm.arm import Arm
-from kinarm.kernels.compiling import KernelCompiler
 from kinarm.problem import ReachProblem
 from kinarm.simulator import Simulator
 
@@ -143,9 +143,9 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
 @pytest.fixture(scope="session", autouse=True)
 def _untraced_compiling() -> Iterator[None]:
     """Numba compiles without being traced."""
-    compile_traced = KernelCompiler.compile_extra
+    compile_traced = CompilerBase.compile_extra
 
-    def compile_extra(self: KernelCompiler, function: Callable[..., object]) -> object:
+    def compile_extra(self: CompilerBase, function: Callable[..., object]) -> object:
         tracer = sys.gettrace()
         sys.settrace(None)
         try:
@@ -154,7 +154,7 @@ def _untraced_compiling() -> Iterator[None]:
             sys.settrace(tracer)
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(KernelCompiler, "compile_extra", compile_extra)
+        patch.setattr(CompilerBase, "compile_extra", compile_extra)
         yield
 
 
