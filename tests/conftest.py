@@ -115,7 +115,7 @@ def pytest_configure(config: pytest.Config) -> None:
         config.pluginmanager.register(Skipped(config))
 
 
-UNTRACED = {"docs", "frozen", "golden", "interop", "kernels", "packaging"}
+UNTRACED = {"frozen", "golden", "kernels"}
 """Folders of tests that repeat at length what others cover, as slow tests do.
 
 Tracing takes half as long again.
