@@ -26,9 +26,6 @@ from kinarm.task import ReachTask
 PRIMITIVES = {"box": (0, 1, 2), "sphere": (0,), "cylinder": (1, 0)}
 """Solids, and which of MoveIt's dimensions are the sizes of a `Body`."""
 
-HORIZON = 1000
-"""Steps until an episode ends: time for any motion of the request [20 s]."""
-
 
 class Entry:
     """A value of a YAML file, which knows its file and its keys there."""
@@ -43,9 +40,8 @@ class Entry:
             import yaml
         except ImportError:
             raise MissingExtraError("PyYAML", "robots") from None
-        loader = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
         with reading(repr(str(file)), kind, InvalidInputError, of="MoveIt"):
-            return cls(yaml.load(file.read_bytes(), loader), file)
+            return cls(yaml.safe_load(file.read_bytes()), file)
 
     def refusal(self, said: object) -> InvalidInputError:
         """An error about this entry."""
@@ -95,7 +91,7 @@ def import_problem(
     """Make a problem of a planning scene and a request with a goal in joint space.
 
     Returns also start and goal, shape (2, n_joints) [rad or m]. The problem is to
-    bring the tool from one to where it is at the other.
+    bring the tool from one to where it is at the other, in 1000 steps.
 
     Parameters
     ----------
@@ -107,7 +103,10 @@ def import_problem(
     here, asked = Entry.of_file(scene, "scene"), Entry.of_file(request, "request")
     asked.refuse("path_constraints", "trajectory_constraints")
     state, bare = asked.at("start_state"), Arm.load(arm).placed(mount.position, mount.rotation)
-    start, goal = _start(state.at("joint_state"), bare), _goal(asked, bare)
+    joints = state.at("joint_state")
+    names = [str(each) for each in joints.each("name")]
+    positions = dict(zip(names, joints.at("position").numbers(len(names)), strict=True))
+    start, goal = _configuration(joints, positions, bare), _goal(asked, bare)
     tool = np.round(bare.tool_position(goal), 9)
     edge = np.array([1e-6, 1e-6, 0.0])  # a region has an area
     lower, upper = (tool - edge).tolist(), (tool + edge).tolist()
@@ -126,17 +125,11 @@ def import_problem(
                 goal_regions=(GoalRegion(name="goal", lower=lower, upper=upper),),
                 mount=mount,
             ),
-            task=ReachTask(starts=(start.tolist(),), horizon=HORIZON),
+            task=ReachTask(starts=(start.tolist(),), horizon=1000),
         )
     except KinarmError as error:
         raise here.refusal(error) from error
     return problem, np.array([start, goal])
-
-
-def _start(joints: Entry, arm: Arm) -> NDArray[np.float64]:
-    names = [str(each) for each in joints.each("name")]
-    positions = joints.at("position").numbers(len(names))
-    return _configuration(joints, dict(zip(names, positions, strict=True)), arm)
 
 
 def _goal(request: Entry, arm: Arm) -> NDArray[np.float64]:
@@ -176,8 +169,8 @@ def _bodies(
     entry.refuse("planes")
     name, frame = str(entry.at("id")), str(entry.at("header", {}).at("frame_id", ""))
     if frame not in frames:
-        known = ", ".join(filter(None, frames)) or "none"
-        raise entry.refusal(f"header.frame_id {frame!r} is no fixed frame; these are: {known}")
+        fixed = ", ".join(filter(None, frames))
+        raise entry.refusal(f"header.frame_id {frame!r} is none of the fixed frames {fixed}")
     place = frames[frame] * (entry.at("pose").pose() if "pose" in entry.value else pin.SE3(1))
     shapes = [*entry.each("primitives"), *entry.each("meshes")]
     poses = [*entry.each("primitive_poses"), *entry.each("mesh_poses")]

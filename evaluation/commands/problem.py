@@ -111,13 +111,11 @@ class ImportRequest:
     Parameters
     ----------
     scene, request : Path
-        YAML file of a planning scene, or a folder of scene*.yaml and
-        request*.yaml; and that of the motion plan request.
+        Two YAML files, or a folder of scene*.yaml and request*.yaml.
     arm : str
         The arm: its name, a URDF, or an arm file.
     position, rpy : tuple of float
-        Where its base stands in the fixed frame of the scene [m], and roll,
-        pitch and yaw [rad].
+        Where its base stands in the scene's fixed frame [m], and its angles [rad].
     out : Path
         Folder of the problem files, which are called as the scenes.
     overwrite : bool
