@@ -110,12 +110,16 @@ class ImportRequest:
 
     Parameters
     ----------
-    scene, request : Path
-        Two YAML files, or a folder of scene*.yaml and request*.yaml.
+    scene : Path
+        A planning scene (.yaml), or a folder of scene*.yaml and request*.yaml.
+    request : Path
+        The motion plan request (.yaml).
     arm : str
         The arm: its name, a URDF, or an arm file.
-    position, rpy : tuple of float
-        Where its base stands in the scene's fixed frame [m], and its angles [rad].
+    position : tuple of float
+        Origin of its base in the fixed frame of the scene [m].
+    rpy : tuple of float
+        Roll, pitch and yaw of the base there [rad].
     out : Path
         Folder of the problem files, which are called as the scenes.
     overwrite : bool
