@@ -48,7 +48,17 @@ def find_contestants(
         `kinarm.ReachEnv`; or, if its argument is called ``venv``, a ``VecEnv``
         of Stable-Baselines3.
     """
-    found = _find(name_or_file, problem, vec_normalize, wrapped=wrapper is not None)
+    text = str(name_or_file)
+    models = [Path(text)] if text.endswith(".zip") else models_in(Path(text))
+    if text in UNTRAINED:
+        found: tuple[Contestant, ...] = (UNTRAINED[text],)
+    elif models:
+        settings, wrapped = (problem, vec_normalize), wrapper is not None
+        found = tuple(_model_contestant(path, *settings, wrapped=wrapped) for path in models)
+    elif is_import_path(text):
+        found = (_imported_contestant(text),)
+    else:
+        found = _policy_contestants(name_or_file, problem)
     if wrapper is None:
         return found
     if callable(wrapper):
@@ -64,23 +74,10 @@ def _name_of(function: Any) -> str:
     return getattr(function, "__name__", None) or type(function).__name__
 
 
-def _find(
-    name_or_file: str | Path,
-    problem: ProblemLike | None,
-    vec_normalize: str | Path | None,
-    *,
-    wrapped: bool,
+def _policy_contestants(
+    name_or_file: str | Path, problem: ProblemLike | None
 ) -> tuple[Contestant, ...]:
-    """What a name stands for, before it is put into a wrapper."""
-    text = str(name_or_file)
-    if text in UNTRAINED:
-        return (UNTRAINED[text],)
-    models = [Path(text)] if text.endswith(".zip") else models_in(Path(text))
-    if models:
-        settings = (problem, vec_normalize)
-        return tuple(_model_contestant(path, *settings, wrapped=wrapped) for path in models)
-    if is_import_path(text):
-        return (_imported_contestant(text),)
+    """Policies of a name, file or folder."""
     try:
         paths = policy_files(name_or_file, problem)
     except UnknownNameError as error:

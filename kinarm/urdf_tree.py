@@ -98,8 +98,15 @@ def read_robot(path: Path) -> Element:
     for joint in robot.findall("joint"):
         _check_joint(joint, f"joint {joint.get('name')!r}")
     for link in robot.findall("link"):
+        where = f"link {link.get('name')!r}"
         for collision in link.findall("collision"):
-            _check_shape(collision, f"link {link.get('name')!r}")
+            geometry = collision.find("geometry")
+            if geometry is None or not len(geometry) or geometry[0].tag not in SHAPES:
+                kinds = ", ".join(SHAPES)
+                raise ArmError(f"{where} needs a shape of {kinds} in each collision element")
+            geometry[1:] = []
+            for element in (geometry[0], *collision.findall("origin")):
+                check_numbers(element, f"a shape of {where}")
     return robot
 
 
@@ -115,16 +122,6 @@ def _check_joint(joint: Element, where: str) -> None:
         along = element.get("xyz", "") if element.tag == "axis" else "1"
         if joint.get("type") in MOVING and math.hypot(*map(float, along.split())) < 1e-6:
             raise ArmError(f"{where} has no axis: {element.attrib}")
-
-
-def _check_shape(collision: Element, where: str) -> None:
-    """Check a collision element's numbers, and drop further shapes."""
-    geometry = collision.find("geometry")
-    if geometry is None or not len(geometry) or geometry[0].tag not in SHAPES:
-        raise ArmError(f"{where} needs a shape of {', '.join(SHAPES)} in each collision element")
-    geometry[1:] = []
-    for element in (geometry[0], *collision.findall("origin")):
-        check_numbers(element, f"a shape of {where}")
 
 
 def check_numbers(element: Element, where: str) -> None:
@@ -172,14 +169,6 @@ def read_joints(robot: Element) -> dict[str, TreeJoint]:
             )
         carried[child] = name
         found[name] = TreeJoint(element, name, kind, parent, child)
-    _check_tree(found, links, carried)
-    return found
-
-
-def _check_tree(
-    joints: Mapping[str, TreeJoint], links: list[str], carried: Mapping[str, str]
-) -> None:
-    """Refuse missing or repeated names, and links that hang on no base."""
     for what, names in (("joint", list(carried.values())), ("link", links)):
         for name, count in Counter(names).items():
             if not name or count > 1:
@@ -188,9 +177,10 @@ def _check_tree(
     if len(roots) > 1:
         raise ArmError(f"no joint joins the links {', '.join(map(repr, roots))}")
     try:
-        TopologicalSorter({joint.child: [joint.parent] for joint in joints.values()}).prepare()
+        TopologicalSorter({joint.child: [joint.parent] for joint in found.values()}).prepare()
     except CycleError:
         raise ArmError("the links form a loop: closed loops are not supported") from None
+    return found
 
 
 def chain_to(link: str, joints: Mapping[str, TreeJoint]) -> list[TreeJoint]:

@@ -154,7 +154,11 @@ def _train(options: argparse.Namespace) -> None:
     request = TrainRequest(**given_options(options, TrainRequest), settings=settings)
     seeds = given_options(options, SeedsRequest)
     if "seeds" in seeds:
-        _train_seeds(SeedsRequest(training=request, **seeds))
+        for seed, out, last in SeedsRequest(training=request, **seeds).run():
+            said = "finished earlier"
+            if last is not None:
+                said = f"return {last.mean_return:+.3f}, success {100 * last.success:.0f} %"
+            sys.stdout.write(f"seed {seed}: {said}; written: {out}\n")
         trained = f"{request.out}/"
     elif "jobs" in seeds:
         raise InvalidInputError("--jobs goes with --seeds")
@@ -176,12 +180,3 @@ def _train_one(request: TrainRequest) -> None:
         f"success {100 * last.success:.0f} %\n"
         f"written: {request.out}, {curve_path(request.out)}\n"
     )
-
-
-def _train_seeds(request: SeedsRequest) -> None:
-    """Train several seeds, and say how good they are."""
-    for seed, out, last in request.run():
-        said = "finished earlier"
-        if last is not None:
-            said = f"return {last.mean_return:+.3f}, success {100 * last.success:.0f} %"
-        sys.stdout.write(f"seed {seed}: {said}; written: {out}\n")

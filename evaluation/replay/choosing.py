@@ -136,7 +136,22 @@ def _find_candidates(request: "ReplayRequest") -> Candidates:
         return _fresh_candidates(request, names)
     if request.source.suffix == ".json":
         return _evaluated_candidates(request.source, request, names)
-    return _recorded_candidates(request.source, names, request.problem, request.arm)
+    problem, arm, runs = request.problem, request.arm, []
+    found = [
+        each for each in load_recordings(request.source) if problem in (None, each.problem.name)
+    ]
+    if arm is not None:  # where their URDF lies now
+        moved = (each.problem.replace(arm=replace(each.problem.arm, source=arm)) for each in found)
+        found = [replace(each, problem=new) for each, new in zip(found, moved, strict=True)]
+    for name in names:
+        run = [each for each in found if name in (None, each.policy, group_of(each.policy))]
+        if name is not None and not run:
+            raise UnknownNameError("policy", name, dict.fromkeys(each.policy for each in found))
+        runs.append(run)
+    trials = list(zip(*runs, strict=False))
+    if not trials:
+        raise InvalidInputError(f"{str(request.source)!r} holds no recording that fits")
+    return Candidates(trials, len(trials))
 
 
 def _fresh_candidates(request: "ReplayRequest", names: Sequence[str | None]) -> Candidates:
@@ -193,9 +208,20 @@ def _evaluated_candidates(
         if name is not None and (Path(name).suffix in (".npz", ".zip") or is_import_path(name)):
             faced = problem or next(iter(document.protocol.problems))
             contestant = _first_contestant(name, document.problem(faced), request)
-        row = document.result(_name_in(document, contestant) if contestant else name, problem)
+            # An evaluation calls it by its folder, too, if others have its name.
+            called = {row.policy for row in document.results}
+            source, name = contestant.source, contestant.name
+            whole = f"{source.parent.name}/{name}" if source else ""
+            name = whole if whole in called and name not in called else name
+        row = document.result(name, problem)
         problem = row.problem
-        chosen.append((row, contestant or _known_contestant(row.policy, path)))
+        if contestant is None:
+            if row.policy not in (*UNTRAINED, *policy_names()) and not is_import_path(row.policy):
+                raise InvalidInputError(
+                    f"policy {row.policy!r} of {str(path)!r} is a file: name it with --policy"
+                )
+            contestant = _first_contestant(row.policy)
+        chosen.append((row, contestant))
     check_normalizing((contestant for _, contestant in chosen), request.vec_normalize)
     count = min(len(row.outcomes.steps) for row, _ in chosen)
     trials = document.trials(str(problem)).first(count)
@@ -215,40 +241,6 @@ def _check_same(row: Result, recordings: Sequence[Recording]) -> None:
                 f"trial {each.trial} of {row.policy!r} ends otherwise than in the evaluation: the "
                 "policy or kinarm has changed, evaluate again"
             )
-
-
-def _known_contestant(name: str, path: Path) -> Contestant:
-    """The contestant of a name that is no user's file."""
-    if name in (*UNTRAINED, *policy_names()) or is_import_path(name):
-        return _first_contestant(name)
-    raise InvalidInputError(f"policy {name!r} of {str(path)!r} is a file: name it with --policy")
-
-
-def _name_in(document: EvaluationDocument, contestant: Contestant) -> str:
-    """Name of a contestant in an evaluation, with its folder if needed."""
-    names = {row.policy for row in document.results}
-    whole = f"{contestant.source.parent.name}/{contestant.name}" if contestant.source else ""
-    return whole if whole in names and contestant.name not in names else contestant.name
-
-
-def _recorded_candidates(
-    path: Path, names: Sequence[str | None], problem: str | None, arm: str | None
-) -> Candidates:
-    """Take recordings from a file; ``arm`` is where their URDF lies now."""
-    found = [each for each in load_recordings(path) if problem in (None, each.problem.name)]
-    if arm is not None:
-        moved = (each.problem.replace(arm=replace(each.problem.arm, source=arm)) for each in found)
-        found = [replace(each, problem=new) for each, new in zip(found, moved, strict=True)]
-    runs = []
-    for name in names:
-        run = [each for each in found if name in (None, each.policy, group_of(each.policy))]
-        if name is not None and not run:
-            raise UnknownNameError("policy", name, dict.fromkeys(each.policy for each in found))
-        runs.append(run)
-    trials = list(zip(*runs, strict=False))
-    if not trials:
-        raise InvalidInputError(f"{str(path)!r} holds no recording that fits")
-    return Candidates(trials, len(trials))
 
 
 def _with_bounds(

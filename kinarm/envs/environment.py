@@ -248,7 +248,19 @@ class ArmEnvironment(Lifecycle):
 
     @spec.setter
     def spec(self, spec: EnvSpec | None) -> None:
-        self._spec = None if spec is None else portable_spec(spec, self.simulator)
+        # It states the horizon; what JSON cannot hold becomes `kinarm.ReachProblem.to_json`.
+        self._spec = spec
+        if spec is None:
+            return
+        given = {name: value for name, value in spec.kwargs.items() if name != "max_episode_steps"}
+        settings = {name: _plain(given[name]) for name in SETTINGS if name in given}
+        kwargs = {**given, **settings}
+        try:
+            json.dumps(kwargs)
+        except TypeError:
+            kwargs = {"problem": self.simulator.problem.to_json(), **settings}
+        steps = spec.max_episode_steps or self.simulator.task.horizon
+        self._spec = replace(spec, kwargs=kwargs, max_episode_steps=steps)
 
 
 def fixed_scenario(
@@ -287,22 +299,6 @@ def fixed_scenario(
             array = within_limits(name, given, arm.chain, arm.joint_names)
         fixed[name] = np.broadcast_to(array, (n, widths[name]))
     return fixed
-
-
-def portable_spec(spec: EnvSpec, simulator: Simulator) -> EnvSpec:
-    """Complete an environment's specification for JSON.
-
-    It states the horizon. What JSON cannot hold becomes `kinarm.ReachProblem.to_json`.
-    """
-    steps = spec.max_episode_steps or simulator.task.horizon
-    given = {name: value for name, value in spec.kwargs.items() if name != "max_episode_steps"}
-    settings = {name: _plain(given[name]) for name in SETTINGS if name in given}
-    kwargs = {**given, **settings}
-    try:
-        json.dumps(kwargs)
-    except TypeError:
-        kwargs = {"problem": simulator.problem.to_json(), **settings}
-    return replace(spec, kwargs=kwargs, max_episode_steps=steps)
 
 
 def _plain(value: Any) -> Any:

@@ -120,8 +120,14 @@ class ReachEnv(ArmEnvironment, gymnasium.Env[Any, Array]):
         except ValueError:  # of the simulator, or of NumPy
             finite_array("action", action, (self.simulator.n_actions,))
             raise
-        if over:
-            self._rest(episode, result)
+        if over:  # tell of the end again
+            gymnasium.logger.warn(
+                "step() was called although the episode is over: call reset() first. "
+                "Nothing moves until then, and rewards are 0."
+            )
+            status = episode.status
+            result.flags[:] = np.equal.outer((TRUNCATED, SUCCESS, COLLISION), status)
+            result.contact[:] = episode.touched * (status == COLLISION)
         reward, terminated, truncated = self.interface.step_outcome(episode, result)
         self._find_contacts(episode, result)
         self._pictures.step(episode)
@@ -143,16 +149,6 @@ class ReachEnv(ArmEnvironment, gymnasium.Env[Any, Array]):
         """Close the live page, if any; nothing can be done afterwards."""
         self.closed = True
         self._pictures.close()
-
-    def _rest(self, episode: Episodes, result: StepResult) -> None:
-        """Let a step after the end tell of the end again."""
-        gymnasium.logger.warn(
-            "step() was called although the episode is over: call reset() first. "
-            "Nothing moves until then, and rewards are 0."
-        )
-        status = episode.status
-        result.flags[:] = np.equal.outer((TRUNCATED, SUCCESS, COLLISION), status)
-        result.contact[:] = episode.touched * (status == COLLISION)
 
     def _observation(self, episode: Episodes) -> Observations:
         return one_by_one(self.interface.observe(episode.observation), 1)[0]

@@ -100,7 +100,18 @@ def policy_from_sb3(
         environment_steps=int(model.attributes["num_timesteps"]),
         config=config,
     )
-    _check_same_actions(policy, model.policy, statistics, interface, simulator)
+    starts, goals = simulator.sample(np.random.default_rng(0), COMPARED)
+    observations = simulator.world.observe(starts, goals)
+    shown = interface.observe(observations)
+    if statistics is not None:
+        shown = statistics.normalize_obs(shown)
+    expected, _ = model.policy.predict(shown, deterministic=True)
+    apart = float(np.abs(policy(observations) - expected).max())
+    if not apart <= ALIKE:
+        raise InvalidInputError(
+            f"the model does more than its network shows ({type(model.policy).__name__}): "
+            f"converted, its actions differ by {apart:.2g}"
+        )
     return policy
 
 
@@ -138,24 +149,6 @@ def _actor_pieces(policy: Any) -> Iterator[Piece]:
         yield from module_pieces(part)
     if policy.squash_output and len(parts) > 1:
         yield "tanh"
-
-
-def _check_same_actions(
-    policy: "Policy", original: Any, statistics: Any, interface: Interface, simulator: Simulator
-) -> None:
-    """Refuse a conversion that acts otherwise than its model."""
-    starts, goals = simulator.sample(np.random.default_rng(0), COMPARED)
-    observations = simulator.world.observe(starts, goals)
-    shown = interface.observe(observations)
-    if statistics is not None:
-        shown = statistics.normalize_obs(shown)
-    expected, _ = original.predict(shown, deterministic=True)
-    apart = float(np.abs(policy(observations) - expected).max())
-    if not apart <= ALIKE:
-        raise InvalidInputError(
-            f"the model does more than its network shows ({type(original).__name__}): converted, "
-            f"its actions differ by {apart:.2g}"
-        )
 
 
 def native_statistics(

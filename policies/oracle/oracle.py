@@ -23,7 +23,6 @@ from dataclasses import dataclass, fields
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from kinarm.episodes import Rollouts
 from kinarm.errors import (
     MOST_TRIALS,
     InvalidInputError,
@@ -182,6 +181,12 @@ class Oracle:
         # A motion that was to come close may reach the goal all the same.
         distance_bounds[replay.success] = 0.0
         complete |= replay.success & (replay.steps == steps_bounds)
+        no_motion = f"no contact-free motion of {horizon} steps or less found"
+        no_end = "no contact-free configuration at the goal found"
+        reasons = [no_motion if steps <= horizon else no_end for steps in search.solved]
+        for row in np.flatnonzero(steps_bounds > horizon):
+            away = f"{distance_bounds[row]:.3f} m away or more within {horizon} steps"
+            reasons[row] = f"out of reach: proven to stay {away}"
         return OracleSolutions(
             reachable=replay.success,
             proof_complete=complete,
@@ -191,7 +196,7 @@ class Oracle:
             distance_lower_bound=distance_bounds,
             actions=search.actions,
             paths=replay.paths,
-            reasons=self._reasons(replay, steps_bounds, distance_bounds, search.solved <= horizon),
+            reasons=np.array(np.where(replay.success, "", reasons), dtype=np.str_),
         )
 
     def _count_contact(
@@ -226,23 +231,6 @@ class Oracle:
         distances[out_of_reach] = np.fmax(distances[out_of_reach], task.tolerance)
         search.try_approach(missed, np.fmax(distances[missed], task.tolerance))
         return distances
-
-    def _reasons(
-        self,
-        replay: Rollouts,
-        steps_bounds: NDArray[np.int64],
-        distance_bounds: Array,
-        has_solution: NDArray[np.bool_],
-    ) -> NDArray[np.str_]:
-        """Say, per trial, why no motion reaches the goal."""
-        horizon = self.simulator.task.horizon
-        no_motion = f"no contact-free motion of {horizon} steps or less found"
-        no_end = "no contact-free configuration at the goal found"
-        reasons = [no_motion if each else no_end for each in has_solution]
-        for row in np.flatnonzero(steps_bounds > horizon):
-            away = f"{distance_bounds[row]:.3f} m away or more within {horizon} steps"
-            reasons[row] = f"out of reach: proven to stay {away}"
-        return np.array(np.where(replay.success, "", reasons), dtype=np.str_)
 
 
 @dataclass(frozen=True, eq=False)
