@@ -125,18 +125,12 @@ class EvaluationRequest(ProblemOptions, TableOptions):
 
     GROUPS: ClassVar = {
         "what is evaluated": (
-            "policies",
-            "against",
-            "problems",
-            "vec_normalize",
-            "wrapper",
-            "matrix",
-            "allow_other_arm",
+            "policies against problems vec_normalize wrapper matrix allow_other_arm"
         ),
-        "trials": ("trials", "seed", "oracle", "hold"),
-        "table": ("columns", "csv", "markdown", "json"),
-        "output": ("out", "report", "card", "overwrite"),
-        "changes to the problems": ProblemOptions.GROUPS["problem"][1:],
+        "trials": "trials seed oracle hold",
+        "table": "columns csv markdown json",
+        "output": "out report card overwrite",
+        "changes to the problems": ProblemOptions.CHANGES,
     }
     DEFAULTS: ClassVar = {
         **ProblemOptions.DEFAULTS,

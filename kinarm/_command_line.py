@@ -37,9 +37,9 @@ def add_options(
 
     Names, types and help come from the dataclass and its docstring. Fields of a
     nested dataclass get its name as a prefix, such as ``--reward-success``. A
-    class attribute ``GROUPS`` puts fields into titled groups; ``DEFAULTS`` says
-    what happens without an option whose field has no telling default, and such
-    a field may be left out.
+    class attribute ``GROUPS`` puts fields, a text of their names, into titled
+    groups; ``DEFAULTS`` says what happens without an option whose field has no
+    telling default, and such a field may be left out.
 
     A field's metadata may hold ``flag`` (another name of the option; without
     dashes, of a positional argument), ``bare`` (values are also taken without
@@ -59,8 +59,8 @@ def add_options(
     names : mapping, optional
         Names for options, by field, if the metadata list none.
     """
-    groups: Mapping[str, Sequence[str]] = getattr(kind, "GROUPS", {})
-    titles = {name: title for title, members in groups.items() for name in members}
+    groups: Mapping[str, str] = getattr(kind, "GROUPS", {})
+    titles = {name: title for title, members in groups.items() for name in members.split()}
     is_parser = isinstance(parser, argparse.ArgumentParser)
     rest = group_of_options(parser, "options") if is_parser else parser
     items = init_fields(kind)

@@ -1,7 +1,7 @@
 """Which problem: the options that all commands and their requests share."""
 
 import sys
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, ClassVar
 
@@ -51,12 +51,10 @@ class ProblemOptions(Checked):
     horizon: int | None = None
     start_spread: float | None = None
 
-    GROUPS: ClassVar[Mapping[str, Sequence[str]]] = {
-        "problem": (
-            *("problem", "arm", "tool_frame", "package_dirs", "task", "scene"),
-            *("tolerance", "horizon", "start_spread"),
-        )
-    }
+    CHANGES: ClassVar = "arm tool_frame package_dirs task scene tolerance horizon start_spread"
+    """Fields that change a problem."""
+
+    GROUPS: ClassVar[Mapping[str, str]] = {"problem": f"problem {CHANGES}"}
     """Fields by the titles of groups."""
 
     DEFAULTS: ClassVar[Mapping[str, str]] = {

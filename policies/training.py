@@ -94,8 +94,8 @@ class TrainRequest(ProblemOptions):
     tensorboard: Path | str | None = field(default=None, metadata={"metavar": "FOLDER"})
 
     GROUPS: ClassVar = {
-        "training": ("recipe", "seed", "resume"),
-        "output": ("out", "overwrite", "tensorboard"),
+        "training": "recipe seed resume",
+        "output": "out overwrite tensorboard",
         **ProblemOptions.GROUPS,
     }
     DEFAULTS: ClassVar = {

@@ -75,8 +75,8 @@ class CheckRequest(ShowRequest):
     overwrite: bool = False
 
     GROUPS: ClassVar = {
-        "what is checked": ("trials", "seed"),
-        "output": ("picture", "json", "overwrite"),
+        "what is checked": "trials seed",
+        "output": "picture json overwrite",
         **ProblemOptions.GROUPS,
     }
 

@@ -38,7 +38,7 @@ class ReproductionRequest(RunningOptions):
     quick: bool = False
     ppo: bool = True
 
-    GROUPS: ClassVar = {"what is trained": ("quick", "ppo", "out"), **RunningOptions.GROUPS}
+    GROUPS: ClassVar = {"what is trained": "quick ppo out", **RunningOptions.GROUPS}
     DEFAULTS: ClassVar = {
         **RunningOptions.DEFAULTS,
         "out": "reproduction; with --quick, reproduction-quick",

@@ -51,8 +51,8 @@ class RunningOptions(Checked):
     minutes: int | None = None
     partition: str | None = None
 
-    GROUPS: ClassVar[Mapping[str, Sequence[str]]] = {
-        "where trainings run": ("jobs", "ray", "slurm", "bundle", "minutes", "partition")
+    GROUPS: ClassVar[Mapping[str, str]] = {
+        "where trainings run": "jobs ray slurm bundle minutes partition"
     }
     DEFAULTS: ClassVar[Mapping[str, str]] = {
         "jobs": "one a processor",
@@ -116,8 +116,8 @@ class StudyRequest(RunningOptions, TableOptions):
     train: bool = True
 
     GROUPS: ClassVar = {
-        "experiment": (*("experiment", "only", "problems", "seeds", "out", "train", "threads"),),
-        "table": ("columns", "csv", "overwrite"),
+        "experiment": "experiment only problems seeds out train threads",
+        "table": "columns csv overwrite",
         **RunningOptions.GROUPS,
     }
     DEFAULTS: ClassVar = {
@@ -131,8 +131,8 @@ class StudyRequest(RunningOptions, TableOptions):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        for name in () if self.train else RunningOptions.GROUPS["where trainings run"]:
-            if getattr(self, name):
+        for name in RunningOptions.GROUPS["where trainings run"].split():
+            if not self.train and getattr(self, name):
                 raise InvalidInputError(f"--{name} does not go with --no-train")
 
     @property

@@ -64,7 +64,7 @@ class SeedsRequest(Checked):
     seeds: tuple[int, ...] = field(metadata={"parse": seeds_of, "metavar": "N", **FROM_ZERO})
     jobs: int | None = None
 
-    GROUPS: ClassVar = {"training": ("seeds", "jobs")}
+    GROUPS: ClassVar = {"training": "seeds jobs"}
     DEFAULTS: ClassVar = {"seeds": "one training", "jobs": "one a processor"}
 
     def __post_init__(self) -> None:

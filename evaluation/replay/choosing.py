@@ -137,9 +137,8 @@ def _find_candidates(request: "ReplayRequest") -> Candidates:
     if request.source.suffix == ".json":
         return _evaluated_candidates(request.source, request, names)
     problem, arm, runs = request.problem, request.arm, []
-    found = [
-        each for each in load_recordings(request.source) if problem in (None, each.problem.name)
-    ]
+    recorded = load_recordings(request.source)
+    found = [each for each in recorded if problem in (None, each.problem.name)]
     if arm is not None:  # where their URDF lies now
         moved = (each.problem.replace(arm=replace(each.problem.arm, source=arm)) for each in found)
         found = [replace(each, problem=new) for each, new in zip(found, moved, strict=True)]

@@ -2,7 +2,7 @@
 
 import webbrowser
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass, field, fields
 from itertools import chain
@@ -22,18 +22,12 @@ if TYPE_CHECKING:
     from kinarm.recording import Recording
     from kinarm.viewer import ReplayPage
 
-ALTERNATIVES = (("policy", "compare"), ("trial", "worst", "collisions", "failures"))
+ALTERNATIVES = ("policy compare", "trial worst collisions failures")
 """Fields that exclude each other."""
 
-NOT_LIVE = (
-    *("source", "compare", "trial", "worst", "collisions", "failures", "trials", "out", "record"),
-)
-NOT_FROM_FILE = (
-    *("tool_frame", "package_dirs", "task", "scene", "tolerance", "horizon", "start_spread"),
-    *("seed", "trials"),
-)
+NOT_LIVE = "source compare trial worst collisions failures trials out record"
+NOT_FROM_FILE = f"{ProblemOptions.CHANGES.removeprefix('arm ')} seed trials"
 """Fields without meaning for the live page, and for trials from a file."""
-
 
 PAGE, GENERATOR = "replay.html", b'<meta name="generator" content="kinarm">'
 """Default page, and what pages of kinarm begin with."""
@@ -124,18 +118,9 @@ class ReplayRequest(ProblemOptions):
     browser: bool = True
 
     GROUPS: ClassVar = {
-        "what is replayed": (
-            "source",
-            "policy",
-            "vec_normalize",
-            "wrapper",
-            "compare",
-            "allow_other_arm",
-        ),
-        "which trials": (
-            *("trials", "seed", "trial", "worst", "collisions", "failures", "oracle"),
-        ),
-        "output": ("out", "record", "overwrite", "live", "port", "browser"),
+        "what is replayed": "source policy vec_normalize wrapper compare allow_other_arm",
+        "which trials": "trials seed trial worst collisions failures oracle",
+        "output": "out record overwrite live port browser",
         **ProblemOptions.GROUPS,
     }
     DEFAULTS: ClassVar = {
@@ -159,21 +144,23 @@ class ReplayRequest(ProblemOptions):
                 raise InvalidInputError(f"{given[0]} and {given[1]} exclude each other")
         if self.port is not None and not self.live:
             raise InvalidInputError("--port goes with --live")
-        self._refuse("--live", NOT_LIVE if self.live else ())
-        self._refuse("trials from a file", NOT_FROM_FILE if self.source else ())
+        self._refuse("--live", NOT_LIVE if self.live else "")
+        self._refuse("trials from a file", NOT_FROM_FILE if self.source else "")
         if self.source is not None and self.source.suffix == ".json":
-            self._refuse("trials of an evaluation", ("arm",))
+            self._refuse("trials of an evaluation", "arm")
         elif self.source is not None:
-            self._refuse("a file of recordings", ("vec_normalize", "wrapper"))
+            self._refuse("a file of recordings", "vec_normalize wrapper")
 
-    def _refuse(self, mode: str, names: Sequence[str]) -> None:
+    def _refuse(self, mode: str, names: str) -> None:
         for option in self._given(names):
             raise InvalidInputError(f"{option} does not go with {mode}")
 
-    def _given(self, names: Sequence[str]) -> list[str]:
+    def _given(self, names: str) -> list[str]:
         """Options of the fields that are given."""
         items = {item.name: item for item in fields(self)}
-        given = (items[name] for name in names if getattr(self, name) != items[name].default)
+        given = (
+            items[name] for name in names.split() if getattr(self, name) != items[name].default
+        )
         return ["a file" if item.name == "source" else option_name(item) for item in given]
 
     def run(self, report: Callable[[str], object] = lambda _: None) -> "ReplayPage | None":
