@@ -179,17 +179,6 @@ def _material(look: Finish) -> dict[str, Any]:
     return described | shine | {"type": "MeshStandardMaterial"}
 
 
-def _show_sun(window: Visualizer) -> None:
-    """Show a light from afar that casts shadows."""
-    own, eye = (f"id-{next(window.window.ids)}" for _ in range(2))
-    sides = {"left": -1.7, "right": 1.7, "top": 1.7, "bottom": -1.7, "near": 0.5, "far": 8.0}
-    shadow = {"mapSize": [2048, 2048], "bias": -0.0004, "normalBias": 0.004, "radius": 3}
-    camera = {"uuid": eye, "type": "OrthographicCamera", "zoom": 1, **sides}
-    light = {"uuid": own, "type": "DirectionalLight", "color": SUN, "intensity": 0.5}
-    window.set_object(_Described({"object": {**light, "shadow": {**shadow, "camera": camera}}}))
-    window["<object>"].set_property("position", list(SUN_PLACE))
-
-
 EXTENSIONS = {"int8": 0x11, "int16": 0x13, "uint16": 0x14, "uint32": 0x16, "float32": 0x17}
 """Codes of MessagePack's extensions that three.js reads as typed arrays."""
 
@@ -225,7 +214,15 @@ def draw_surroundings(window: Visualizer, scene: Scene) -> None:
         window[path].set_property("intensity", intensity)
     for end in ("top_color", "bottom_color"):
         window["/Background"].set_property(end, BACKGROUND)
-    _show_sun(window["sun"])
+    # A light from afar that casts shadows.
+    own, eye = (f"id-{next(window.window.ids)}" for _ in range(2))
+    sides = {"left": -1.7, "right": 1.7, "top": 1.7, "bottom": -1.7, "near": 0.5, "far": 8.0}
+    shadow = {"mapSize": [2048, 2048], "bias": -0.0004, "normalBias": 0.004, "radius": 3}
+    camera = {"uuid": eye, "type": "OrthographicCamera", "zoom": 1, **sides}
+    light = {"uuid": own, "type": "DirectionalLight", "color": SUN, "intensity": 0.5}
+    shining = {"object": {**light, "shadow": {**shadow, "camera": camera}}}
+    window["sun"].set_object(_Described(shining))
+    window["sun"]["<object>"].set_property("position", list(SUN_PLACE))
     if scene.ground:
         put(window["floor"], FLOOR, cylinder(0.002, FLOOR_RADIUS, 0.0).moved((0, 0, -0.002)))
         lines = {"attributes": {"position": _typed_array(_grid_lines().astype(np.float32), 3)}}

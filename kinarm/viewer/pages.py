@@ -13,7 +13,6 @@ from typing import Any
 
 import coal
 import numpy as np
-import pinocchio as pin
 from jinja2 import Environment, FunctionLoader, StrictUndefined
 from markupsafe import Markup
 from numpy.typing import ArrayLike
@@ -315,7 +314,16 @@ def arm_page(
     for number, part in enumerate(collision_parts(arm)):
         put(frames[part.joint][f"shape_{number}"], SHAPE, part.mesh)
     objects = zip(model.geometry.geometryObjects, model.body_names, strict=True)
-    bodies = [{"name": name, "joint": s.parentJoint, **_shape_data(s)} for s, name in objects]
+    bodies = []
+    for shape, name in objects:
+        bodies.append(body := {"name": name, "joint": shape.parentJoint})
+        if isinstance(shape.geometry, coal.Halfspace):
+            continue
+        # The hull of points in the joint's frame, widened by a radius or discs [m].
+        points, radius = core(shape)
+        placed = points @ shape.placement.rotation.T + shape.placement.translation
+        discs = radius if isinstance(shape.geometry, coal.Cylinder) else 0.0
+        body |= {"points": placed.tolist(), "discs": discs, "radius": radius - discs}
     data = arm_data(arm, scene) | {
         "joints": list(arm.joint_names),
         **{name: getattr(arm, name).tolist() for name in ("lower", "upper", "home")},
@@ -329,16 +337,3 @@ def arm_page(
     if path is not None:
         page.save(path)
     return page
-
-
-def _shape_data(shape: pin.GeometryObject) -> dict[str, Any]:
-    """A shape as the hull of points, widened by a radius or discs; the ground has no points.
-
-    In its joint's frame [m].
-    """
-    if isinstance(shape.geometry, coal.Halfspace):
-        return {}
-    points, radius = core(shape)
-    placed = points @ shape.placement.rotation.T + shape.placement.translation
-    discs = radius if isinstance(shape.geometry, coal.Cylinder) else 0.0
-    return {"points": placed.tolist(), "discs": discs, "radius": radius - discs}

@@ -182,7 +182,10 @@ def visual_parts(arm: Arm) -> Iterator[ArmPart]:
     for link in robot.findall("link"):
         frame = arm.model.frames[arm.model.getFrameId(link.get("name"), pin.FrameType.BODY)]
         for visual in link.findall("visual"):
-            placement = frame.placement * _origin(visual)
+            origin = visual.find("origin")
+            origin = Element("origin") if origin is None else origin
+            turn = pin.rpy.rpyToMatrix(np.array(_numbers(origin, "rpy")))
+            placement = frame.placement * pin.SE3(turn, np.array(_numbers(origin, "xyz")))
             look, stated = visual.find("material"), None
             if look is not None and (stated := _stated_colour(look)) is None:
                 stated = named.get(look.get("name"))
@@ -206,14 +209,6 @@ def _shapes(visual: Element, file: str) -> tuple[PaintedMesh, ...]:
     names, kind = SIZES[shape.tag]
     solid = kind(*(size for name in names for size in _numbers(shape, name, where)))
     return (PaintedMesh(from_coal(solid), None),)
-
-
-def _origin(visual: Element) -> pin.SE3:
-    """Where a shape stands on its link."""
-    origin = visual.find("origin")
-    origin = Element("origin") if origin is None else origin
-    turn = pin.rpy.rpyToMatrix(np.array(_numbers(origin, "rpy")))
-    return pin.SE3(turn, np.array(_numbers(origin, "xyz")))
 
 
 def _stated_colour(material: Element) -> int | None:
