@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from kinarm._fields import OPTIONAL, Checked
 from kinarm._files import absolute
+from kinarm.body_motion import BodyMotion
 from kinarm.errors import FROM_ZERO, NOT_NEGATIVE, InvalidInputError, KinarmError, ProblemError
 
 Point = tuple[float, float, float]
@@ -98,6 +99,8 @@ class Body(Checked):
         Roll, pitch and yaw about fixed axes [rad].
     quaternion : tuple of float
         Its orientation as w, x, y and z, instead of rpy.
+    motion : BodyMotion, optional
+        How it moves, if it does.
     """
 
     name: str
@@ -107,6 +110,7 @@ class Body(Checked):
     position: Point = (0.0, 0.0, 0.0)
     rpy: Point = field(default=(0.0, 0.0, 0.0), metadata=OPTIONAL)
     quaternion: tuple[float, float, float, float] | None = None
+    motion: BodyMotion | None = None
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -215,7 +219,9 @@ class RandomBodies(Checked):
     turned : str
         ``"no"``, ``"yaw"``, about the vertical, or ``"any"``.
     clear_of_goal : float
-        Distance that they keep from the goal [m].
+        Distance that they keep from the goal when an episode begins [m].
+    motion : BodyMotion, optional
+        How all of them move, if they do.
     """
 
     name: str
@@ -229,6 +235,7 @@ class RandomBodies(Checked):
     upper: Point | None = None
     turned: Literal["no", "yaw", "any"] = "no"
     clear_of_goal: float = field(default=0.05, metadata=NOT_NEGATIVE)
+    motion: BodyMotion | None = None
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -263,6 +270,7 @@ class RandomBodies(Checked):
             size=size,
             vertices=self.vertices,
             position=PARKED,
+            motion=self.motion,
         )
 
 
@@ -282,6 +290,8 @@ class HeldBody(Body):
         super().__post_init__()
         if self.shape == "halfspace":
             raise ProblemError(f"{self._told} has no end: link {self.link!r} cannot hold it")
+        if self.motion is not None:
+            raise ProblemError(f"{self._told} moves with link {self.link!r}, not by itself")
 
 
 def read_meshes(table: Any, path: Path) -> None:

@@ -50,6 +50,47 @@ class Contact(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
+class Step:
+    """A straight motion of the arm, and of bodies of the scene.
+
+    Attributes
+    ----------
+    model : ContactModel
+        The arm in the scene.
+    start, end : ndarray, shape (n_joints,)
+        Where the arm moves [rad or m].
+    before, after : ndarray, shape (n_placed, 16), optional
+        Rows of the scene's bodies, if they are not where the model has them.
+    """
+
+    model: "ContactModel"
+    start: NDArray[np.float64]
+    end: NDArray[np.float64]
+    before: NDArray[np.float64] | None = None
+    after: NDArray[np.float64] | None = None
+
+    def at(self, share: float) -> tuple["ContactModel", NDArray[np.float64]]:
+        """The model when a share of it is over, until the next call, and the configuration."""
+        model, over = self.model, share == 1.0
+        if self.before is not None and self.after is not None:
+            rows = self.before + share * (self.after - self.before)
+            model = model.at(self.after if over else rows)
+        return model, self.end if over else self.start + share * (self.end - self.start)
+
+    @property
+    def motion(self) -> NDArray[np.float64]:
+        """Largest motion of the bodies of each pair against each other, shape (n_pairs,) [m]."""
+        shapes = self.model.shapes
+        moved = np.abs(self.end - self.start)[: len(shapes.travel), None]
+        motion: NDArray[np.float64] = (moved * shapes.travel).sum(axis=0)
+        if self.before is not None and self.after is not None:
+            ways = np.linalg.norm(self.after[:, 13:] - self.before[:, 13:], axis=1)
+            others = shapes.pairs[:, 2] - (len(shapes.capsules) - len(ways))
+            motion += np.where(others < 0, 0.0, ways[others])
+        return motion
+
+
+@dataclass(frozen=True, eq=False)
 class ContactModel:
     """An arm in a scene, with the pairs of bodies that are tested for contact.
 
@@ -149,10 +190,6 @@ class ContactModel:
             for pair in self.geometry.collisionPairs
         )
 
-    def of_row(self, scenes: NDArray[np.float64], row: int) -> "ContactModel":
-        """The model `at` a row of scenes, or this one if there are none."""
-        return self.at(scenes[row]) if len(scenes) else self
-
     def at(self, scene: NDArray[np.float64]) -> "ContactModel":
         """The same model with the scene's bodies elsewhere, until the next call.
 
@@ -246,8 +283,9 @@ class ContactModel:
             Configurations in the order of the motion [rad or m].
         doubt : ndarray of int, shape (n,)
             Bit k set: configuration k, from 0, is in doubt.
-        scenes : ndarray, shape (n, n_placed, 16)
-            As for `touching`.
+        scenes : ndarray, shape (n, n_tested, n_placed, 16)
+            Rows of bodies as in ``shapes.placed``; empty if they always rest
+            where the model has them.
 
         Returns
         -------
@@ -260,12 +298,13 @@ class ContactModel:
         for k in range(ways.shape[1]):
             rows = np.flatnonzero((doubt & 1 << k != 0) & (touched == 0))
             if rows.size:
-                there = scenes[rows] if len(scenes) else scenes
+                there = scenes[rows, k] if len(scenes) else scenes
                 hit = rows[self.touching(ways[rows, k], there)]
                 touched[hit] = -1
                 asked += rows.size
                 for row in hit if len(ways) <= FEW else ():
-                    index = self.of_row(scenes, row).first_in_contact(ways[row, k])
+                    model = self.at(scenes[row, k]) if len(scenes) else self
+                    index = model.first_in_contact(ways[row, k])
                     touched[row] = -1 if index is None else index + 1
         return touched, asked
 

@@ -69,7 +69,8 @@ class ContactShapes(NamedTuple):
         Lower and upper ends of the corners [m].
     planes : ndarray of int, shape (n_pairs, 5)
         Carrier of the separating plane; mover against it; its first axis, and
-        the one after the last; frame of the plane.
+        the one after the last; frame of the plane, which is the world's for
+        bodies that rest.
     proxies : ndarray of int, shape (n_pairs, 2, 2)
         Bodies that stand for these two: in every step, and where it is close.
     farthest : ndarray, shape (n_actuated,)
@@ -77,6 +78,8 @@ class ContactShapes(NamedTuple):
     placed : ndarray, shape (n_placed, POSE)
         Rows in ``poses`` of the scene's bodies: size x, y, z and rounding [m],
         rotation matrix, position [m].
+    moving : ndarray of int, shape (n_moving,)
+        Rows of ``placed`` of bodies that move.
     """
 
     capsules: Array
@@ -91,6 +94,7 @@ class ContactShapes(NamedTuple):
     proxies: NDArray[np.int64]
     farthest: Array
     placed: Array
+    moving: NDArray[np.int64]
 
     @classmethod
     def build(
@@ -125,7 +129,9 @@ class ContactShapes(NamedTuple):
             kind = BETWEEN_CAPSULES if within else surroundings[second - n_shapes].kind
             rows.append((kind, first, second))
             carrier, mover = (first, second) if within else (second, first)
-            frame = base = links[carrier] if within else 0
+            base = links[carrier] if within else 0
+            moves = not within and second - n_shapes in scene.moving
+            frame = links[carrier] if within or moves else 0
             if kind == WITH_HALFSPACE and _keeps_height(arm.chain, scene.bodies[second - n_shapes]):
                 base = 1
             last = min(links[mover], arm.n_actuated)
@@ -156,6 +162,7 @@ class ContactShapes(NamedTuple):
             proxies=np.array(proxies, dtype=np.int64).reshape(-1, 2, 2),
             farthest=travel.max(axis=1, initial=0.0),
             placed=np.array(list(map(placed_row, scene.bodies, surroundings))).reshape(-1, 16),
+            moving=np.array(scene.moving, dtype=np.int64),
         )
 
 

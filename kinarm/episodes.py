@@ -34,6 +34,9 @@ class Rules(NamedTuple):
         Distance at which a goal is reached [m], and largest number of steps.
     reward : ndarray, shape (n_terms,)
         Weights of the reward terms.
+    moves : ndarray, shape (horizon + 1, n_moving, 3)
+        Offsets of the scene's moving bodies after each step [m], between which
+        they move straight.
     """
 
     step_limit: Array
@@ -41,6 +44,7 @@ class Rules(NamedTuple):
     tolerance: float
     horizon: int
     reward: Array
+    moves: Array
 
 
 class Control(NamedTuple):
@@ -95,8 +99,8 @@ class Episodes(NamedTuple):
         Separating plane of each pair and height above it at ``q``; see
         ``kinarm.kernels.planes``.
     scenes : ndarray, shape (n, n_placed, 16) or (0, n_placed, 16)
-        Rows in ``poses`` of each episode's bodies, if they differ; see
-        ``kinarm.contact_shapes``.
+        Rows in ``poses`` of each episode's bodies when it began, if they differ
+        or move; see ``kinarm.contact_shapes``.
     goal, distance : ndarray, shape (n, 3) and (n,)
         Goal position, and the tool's distance from it [m].
     observation : ndarray, shape (n, n_observations)
@@ -131,7 +135,7 @@ class Episodes(NamedTuple):
     path: Array
 
     def scenes_at(self, rows: NDArray[np.int64]) -> Array:
-        """Scenes of some episodes; empty if all have the same."""
+        """Scenes of some episodes when they began; empty if all have the same."""
         return self.scenes[rows] if len(self.scenes) else self.scenes
 
     def resume(self, rows: NDArray[np.int64], horizon: int) -> None:

@@ -12,7 +12,9 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
+import numpy as np
 import tomli_w
+from numpy.typing import NDArray
 
 from kinarm._fields import Checked, from_plain, init_fields, read_toml, take_base, to_plain
 from kinarm._files import absolute, is_file, named_file, shipped_files, write_text
@@ -136,6 +138,15 @@ class ReachProblem(Checked):
         if of_stepping:
             changes["stepping"] = replace(stepping, **of_stepping)
         return replace(self, **changes)
+
+    def body_offsets(self, taken: NDArray[np.int64]) -> NDArray[np.float64]:
+        """How far bodies that move are from where an episode begins, shape (n, n_moving, 3) [m].
+
+        Takes numbers of steps, shape (n,).
+        """
+        times = taken.astype(np.float64) * self.stepping.time_step
+        motions = [body.motion.offsets(times) for body in self.scene.bodies if body.motion]
+        return np.stack(motions, axis=1) if motions else np.zeros((len(taken), 0, 3))
 
     def load_arm(self) -> "Arm":
         """The arm, where it stands in the scene."""

@@ -213,7 +213,8 @@ def record_rollouts(
         touch = None
         if rollouts.collision[number]:
             there = world.in_scene(rollouts.starts[number], goal)
-            touch = there.contact(rollouts.configurations[number], rollouts.targets[number])
+            refused = rollouts.configurations[number], rollouts.targets[number]
+            touch = there.contact(*refused, step=len(states) - 2)
         recordings.append(
             Recording(
                 policy=policy,
@@ -274,7 +275,7 @@ def record_path(
     states = _stepwise(world, points)
     contact = None
     for step, motion in enumerate(pairwise(states)):
-        if (contact := world.contact(*motion)) is not None:
+        if (contact := world.contact(*motion, step=step)) is not None:
             states = np.concatenate([states[: step + 1], states[step : step + 1]])
             break
     distances = world.distances(states, np.tile(aim, (len(states), 1)))

@@ -58,7 +58,7 @@ class ReferenceSimulator:
         motion = stepping.contact == "motion"
         self.tested = SAMPLES if motion else stepping.tested_configurations
         self._data = self.arm.model.createData()
-        self._world = simulator.world
+        self._world, self._problem = simulator.world, simulator.problem
         self._begin(simulator.world.contact_model)
 
     def rollout(
@@ -75,6 +75,9 @@ class ReferenceSimulator:
             Start configuration [rad or m] and goal position [m].
         """
         self._begin(self._world.in_scene(start, goal).contact_model)
+        rows = np.tile(self.contact_model.shapes.placed, (self.task.horizon + 1, 1, 1))
+        moving = list(self._problem.scene.moving)
+        rows[:, moving, 13:] += self._problem.body_offsets(np.arange(len(rows)))
         q, reward = np.array(start), self.task.reward
         observation, distance = self.observe(q, goal)
         path, observations = [q], [observation]
@@ -85,7 +88,8 @@ class ReferenceSimulator:
             target = q.copy()
             target[: self.step_limit.size] += action * self.step_limit
             target = np.clip(target, self.arm.lower, self.arm.upper)
-            contact = self.first_contact(q, target)
+            bodies = rows[len(rewards) : len(rewards) + 2] if moving else None
+            contact = self.first_contact(q, target, bodies)
             before = distance
             if contact is None:
                 q = target
@@ -112,8 +116,8 @@ class ReferenceSimulator:
 
     def _begin(self, contact_model: ContactModel) -> None:
         """Take the bodies of an episode."""
-        self.contact_model = contact_model
-        self._geometry_data = make_verdicts_reliable(contact_model.geometry.createData())
+        self.contact_model, self._geometry = contact_model, contact_model.geometry.clone()
+        self._geometry_data = make_verdicts_reliable(self._geometry.createData())
 
     def observe(self, q: Array, goal: Array) -> tuple[Array, float]:
         """Observation of a configuration and the distance to the goal [m]."""
@@ -138,14 +142,31 @@ class ReferenceSimulator:
             quaternions.append(np.array([w, x, y, z]))
         return quaternions
 
-    def first_contact(self, q: Array, target: Array) -> tuple[str, str] | None:
-        """First pair that touches at a step's tested configurations, or None."""
-        model, geometry = self.arm.model, self.contact_model.geometry
+    def first_contact(
+        self, q: Array, target: Array, bodies: Array | None = None
+    ) -> tuple[str, str] | None:
+        """First pair that touches at a step's tested configurations, or None.
+
+        Parameters
+        ----------
+        q, target : ndarray, shape (n_joints,)
+            Ends of the step [rad or m].
+        bodies : ndarray, shape (2, n_placed, 16), optional
+            Rows of the scene's bodies before and after it, if they move.
+        """
+        model, geometry, data = self.arm.model, self._geometry, self._geometry_data
+        placed = list(geometry.geometryObjects)[self.arm.geometry.ngeoms :]
         for k in range(1, self.tested + 1):
-            tested = target if k == self.tested else q + k / self.tested * (target - q)
-            start_anew(self._geometry_data.collisionRequests)
-            if pin.computeCollisions(
-                model, self._data, geometry, self._geometry_data, tested, True
-            ):
-                return self.contact_model.contact_pair(tested)
+            share = k / self.tested
+            tested = target if k == self.tested else q + share * (target - q)
+            if bodies is not None:
+                ways = zip(placed, *bodies[:, :, 13:], strict=True)
+                for shape, start, end in ways:
+                    there = end if k == self.tested else start + share * (end - start)
+                    shape.placement = pin.SE3(shape.placement.rotation, there)
+            start_anew(data.collisionRequests)
+            if pin.computeCollisions(model, self._data, geometry, data, tested, True):
+                # Pairs are tested in order up to the first in contact.
+                touching = (result.isCollision() for result in data.collisionResults)
+                return self.contact_model.pair_names[list(touching).index(True)]
         return None

@@ -177,6 +177,11 @@ class Scene(Checked):
         ground = (Body(name="ground", shape="halfspace"),) if self.ground else ()
         return (*obstacles, *random, *ground)
 
+    @cached_property
+    def moving(self) -> tuple[int, ...]:
+        """Indices of the bodies that move."""
+        return tuple(k for k, body in enumerate(self.bodies) if body.motion is not None)
+
     def obstacle_around(self, region: GoalRegion) -> Body | None:
         """First body that wholly contains a goal region, or None.
 

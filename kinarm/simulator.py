@@ -113,6 +113,12 @@ class Simulator:
         other.world = self.world.in_scene(start, goal)
         return other
 
+    def without_moving_bodies(self) -> "Simulator":
+        """The same simulator without the bodies that move."""
+        other = copy(self)
+        other.world = self.world.without_moving_bodies()
+        return other
+
     def sample(
         self, rng: np.random.Generator, count: int, *, start_spread: float | None = None
     ) -> tuple[Array, Array]:
@@ -132,6 +138,7 @@ class Simulator:
         *,
         record: bool = False,
         origins: Array | None = None,
+        taken: NDArray[np.int64] | int = 0,
     ) -> Episodes:
         """Begin a batch of episodes, to be driven by `step`.
 
@@ -144,8 +151,11 @@ class Simulator:
         origins : ndarray, shape (n, n_joints), optional
             Where episodes that go on at these starts had begun [rad or m]:
             random bodies stay.
+        taken : ndarray of int, shape (n,), or int
+            Steps that they have taken before.
         """
-        return self._begin(*self.check_scenarios(starts, goals), record=record, origins=origins)
+        scenarios = self.check_scenarios(starts, goals)
+        return self._begin(*scenarios, origins=origins, taken=taken, record=record)
 
     def step(self, episodes: Episodes, actions: ArrayLike) -> StepResult:
         """Advance every running episode by one step, in place.
@@ -230,7 +240,8 @@ class Simulator:
         pairs: list[tuple[str, str] | None] = [None] * len(rollouts)
         for i in np.flatnonzero(rollouts.collision):
             there = self.world.in_scene(rollouts.starts[i], rollouts.goals[i])
-            pairs[i] = there.contact_pair(rollouts.configurations[i], rollouts.targets[i])
+            step = rollouts.configurations[i], rollouts.targets[i]
+            pairs[i] = there.contact_pair(*step, step=int(rollouts.steps[i]) - 1)
         return tuple(pairs)
 
     def begin(self, episodes: Episodes, rows: NDArray[np.int64]) -> None:
@@ -246,10 +257,16 @@ class Simulator:
         return within_limits("starts", q, self.arm.chain, self.arm.joint_names), goal
 
     def _begin(
-        self, starts: Array, goals: Array, origins: Array | None = None, **kept: Any
+        self,
+        starts: Array,
+        goals: Array,
+        *,
+        origins: Array | None = None,
+        taken: NDArray[np.int64] | int = 0,
+        **kept: Any,
     ) -> Episodes:
         episodes = self.world.episodes(starts, goals, **kept)
-        self._start(np.arange(len(starts)), self._stepped(episodes), origins)
+        self._start(np.arange(len(starts)), self._stepped(episodes), origins, taken)
         return episodes
 
     def _refilled(
@@ -271,21 +288,27 @@ class Simulator:
         return session.episodes
 
     def _start(
-        self, rows: NDArray[np.int64], session: Session, origins: Array | None = None
+        self,
+        rows: NDArray[np.int64],
+        session: Session,
+        origins: Array | None = None,
+        taken: NDArray[np.int64] | int = 0,
     ) -> None:
         """Start some episodes in their scenes; Coal decides about doubtful starts."""
         episodes, contacts = session.episodes, self.world.contact_model
-        if len(episodes.scenes):
+        episodes.steps[rows] = taken
+        if self.world.has_random_bodies:
             begun = episodes.q[rows] if origins is None else origins
             episodes.scenes[rows] = self.world.scenes_of(begun, episodes.goal[rows])
         if not run_together(begin, len(rows), self.threads, session.of_thread, rows):
             return
         paused = rows[episodes.status[rows] == PAUSED]
-        touching = contacts.touching(episodes.q[paused], episodes.scenes_at(paused))
+        there = self.world.moved(episodes.scenes_at(paused), episodes.steps[paused])
+        touching = contacts.touching(episodes.q[paused], there)
         if touching.any():
-            index = int(paused[touching.argmax()])
-            there = self.world.in_scene(episodes.q[index], episodes.goal[index])
-            pair = there.contact_pair(episodes.q[index])
+            first = int(touching.argmax())
+            index, model = int(paused[first]), contacts.at(there[first]) if len(there) else contacts
+            pair = model.contact_pair(episodes.q[index])
             raise StartInContactError(index, pair or ("arm", "scene"))
         episodes.status[paused] = RUNNING
 
@@ -322,8 +345,9 @@ class Simulator:
         """Let Coal refuse steps in doubt; return which episodes go on."""
         episodes = session.episodes
         motions = episodes.q[paused], episodes.target[paused]
-        doubtful = episodes.doubt[paused], episodes.scenes_at(paused)
-        touched, asked = self.world.first_contacts(*motions, *doubtful)
+        doubt, scenes = episodes.doubt[paused], episodes.scenes_at(paused)
+        taken = episodes.steps[paused]
+        touched, asked = self.world.first_contacts(*motions, doubt, scenes, taken)
         self.checked_by_coal += asked
         refused = touched != 0
         resumed: NDArray[np.int64] = paused[~refused]

@@ -1,6 +1,8 @@
 """The world of a problem: arm, scene, and questions about configurations."""
 
+from collections.abc import Iterator
 from copy import copy
+from dataclasses import replace
 from functools import cached_property
 from typing import Any
 
@@ -8,9 +10,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from kinarm._parallel import available_threads, run_rows
+from kinarm.bodies import PARKED
 from kinarm.chain import Chain, within_limits
 from kinarm.clearance import Clearance, flattened, measure_clearance
-from kinarm.collision import Contact, ContactModel
+from kinarm.collision import Contact, ContactModel, Step
 from kinarm.contact_shapes import PLANE, ContactShapes
 from kinarm.episode_scenes import drawn_rows
 from kinarm.episodes import Control, Episodes, Rules
@@ -51,6 +54,11 @@ class World(InverseKinematics):
         Task and motion limits for the kernels.
     has_random_bodies : bool
         Whether each episode has a scene of its own.
+
+    Notes
+    -----
+    Of bodies that move, questions about configurations take the first position,
+    and those about steps the position at the number of the step, from 0.
     """
 
     def __init__(self, problem: ProblemLike, *, threads: int | None = None) -> None:
@@ -69,6 +77,7 @@ class World(InverseKinematics):
             tolerance=float(task.tolerance),
             horizon=int(task.horizon),
             reward=task.reward.vector,
+            moves=self.problem.body_offsets(np.arange(task.horizon + 1)),
         )
         self.has_random_bodies = bool(self.problem.scene.random_bodies)
         self._idle: list[tuple[Block, Alone]] = []
@@ -199,6 +208,19 @@ class World(InverseKinematics):
         other.contact_model = self.contact_model.fixed(scenes[0])
         return other
 
+    def without_moving_bodies(self) -> "World":
+        """The same world without the bodies that move."""
+        shapes = self.contact_model.shapes
+        if not len(shapes.moving):
+            return self
+        rows = shapes.placed.copy()
+        # What is on the other side of a half-space is far from its plane.
+        rows[shapes.moving, 13:] = PARKED[2] * rows[shapes.moving][:, [6, 9, 12]]
+        other, model = copy(self), self.contact_model.fixed(rows)
+        none = np.zeros(0, dtype=np.int64)
+        other.contact_model = replace(model, shapes=model.shapes._replace(moving=none))
+        return other
+
     def clearance(self, configurations: ArrayLike) -> Clearance:
         """Measure how far the closest of the tested pairs is apart, and where.
 
@@ -227,7 +249,9 @@ class World(InverseKinematics):
             pairs[row] = self.contact_model.contact_pair(q[row])
         return tuple(pairs)
 
-    def contact(self, configuration: ArrayLike, target: ArrayLike | None = None) -> Contact | None:
+    def contact(
+        self, configuration: ArrayLike, target: ArrayLike | None = None, *, step: int = 0
+    ) -> Contact | None:
         """Describe the contact of a configuration, or the first one of a step; None if none.
 
         Parameters
@@ -236,34 +260,87 @@ class World(InverseKinematics):
             Where the arm is or the step begins [rad or m].
         target : array_like, shape (n_joints,), optional
             Where the step ends [rad or m].
+        step : int
+            Steps taken before, which tell where bodies are that move.
         """
+        shapes, taken = self.contact_model.shapes, whole_number("step", step, 0)
         q = finite_array("configuration", configuration, (self.arm.n_joints,))
+        scenes = shapes.placed[None] if len(shapes.moving) else self._no_scenes
         if target is None:
-            return self.contact_model.contact(q)
+            there = self.moved(scenes, np.array([taken]))
+            return (self.contact_model.at(there[0]) if len(there) else self.contact_model).contact(
+                q
+            )
         aim = finite_array("target", target, (self.arm.n_joints,))
+        (asked,) = self.steps_of(q[None], aim[None], scenes, np.array([taken]))
+        return self.contact_of_step(asked)
+
+    def contact_of_step(self, step: Step) -> Contact | None:
+        """Describe the first contact of a step of `steps_of`, or return None."""
         if self.rules.tested == 0:
-            return contact_in_motion(self.contact_model, q, aim)
-        tested = self.substeps(q[None], aim[None])[0]
-        touching = np.flatnonzero(self.contact_model.in_contact(tested))
-        return self.contact_model.contact(tested[touching[0]]) if touching.size else None
+            return contact_in_motion(step)
+        asked = (step.at(share) for share in self._shares[:, 0].tolist())
+        contacts = (model.contact(q) for model, q in asked)
+        return next((contact for contact in contacts if contact), None)
+
+    def steps_of(
+        self, starts: Array, ends: Array, scenes: Array, taken: NDArray[np.int64]
+    ) -> Iterator[Step]:
+        """Steps of episodes.
+
+        Parameters
+        ----------
+        starts, ends : ndarray, shape (n, n_joints)
+            Where the arm moves [rad or m].
+        scenes : ndarray, shape (n, n_placed, 16) or (0, n_placed, 16)
+            Rows of the bodies when the episodes began, if they differ or move.
+        taken : ndarray of int, shape (n,)
+            Steps that the episodes have taken before.
+        """
+        ways = self.moved(scenes, taken), self.moved(scenes, taken + 1)
+        for row, (start, end) in enumerate(zip(starts, ends, strict=True)):
+            bodies = [way[row] for way in ways] if len(scenes) else []
+            yield Step(self.contact_model, start, end, *bodies)
+
+    def moved(self, scenes: Array, taken: NDArray[np.int64]) -> Array:
+        """Rows of the bodies of episodes after some steps; see `steps_of`."""
+        moving = self.contact_model.shapes.moving
+        if not len(scenes) or not len(moving):
+            return scenes
+        rows = scenes.copy()
+        rows[:, moving, 13:] += self.problem.body_offsets(taken)
+        return rows
 
     def first_contacts(
-        self, starts: Array, ends: Array, doubt: NDArray[np.int64], scenes: Array
+        self,
+        starts: Array,
+        ends: Array,
+        doubt: NDArray[np.int64],
+        scenes: Array,
+        taken: NDArray[np.int64],
     ) -> tuple[NDArray[np.int64], int]:
         """Let Coal decide about steps in doubt.
 
-        See `kinarm.collision.ContactModel.first_contacts`. Takes ends of steps, shape (n,
-        n_joints) [rad or m].
+        Parameters
+        ----------
+        starts, ends, scenes, taken
+            As for `steps_of`.
+        doubt
+            As for `kinarm.collision.ContactModel.first_contacts`, which tells
+            the results.
         """
         if self.rules.tested == 0:
-            return motions_in_contact(self.contact_model, starts, ends, doubt, scenes)
-        return self.contact_model.first_contacts(self.substeps(starts, ends), doubt, scenes)
+            return motions_in_contact(self.steps_of(starts, ends, scenes, taken), doubt)
+        before, after = (self.moved(scenes, taken + k).reshape(len(scenes), -1) for k in (0, 1))
+        shape = (len(scenes), len(self._shares), *scenes.shape[1:])
+        there = self.substeps(before, after).reshape(shape)
+        return self.contact_model.first_contacts(self.substeps(starts, ends), doubt, there)
 
     def contact_pair(
-        self, configuration: ArrayLike, target: ArrayLike | None = None
+        self, configuration: ArrayLike, target: ArrayLike | None = None, *, step: int = 0
     ) -> tuple[str, str] | None:
         """Names of the bodies of what `contact` describes, or None."""
-        contact = self.contact(configuration, target)
+        contact = self.contact(configuration, target, step=step)
         return contact.pair if contact else None
 
     def substeps(self, configurations: Array, targets: Array) -> Array:
@@ -293,6 +370,7 @@ class World(InverseKinematics):
         n, n_joints = starts.shape
         horizon, n_observations = self.rules.horizon, self.n_observations
         shapes = self.contact_model.shapes
+        own_scenes = self.has_random_bodies or len(shapes.moving) > 0
         return Episodes(
             status=np.zeros(n, dtype=np.int64),
             steps=np.zeros(n, dtype=np.int64),
@@ -303,7 +381,7 @@ class World(InverseKinematics):
             touched=np.zeros(n, dtype=np.int64),
             cleared=np.zeros(n, dtype=bool),
             planes=np.zeros((n, len(shapes.pairs), PLANE)),
-            scenes=np.zeros((n if self.has_random_bodies else 0, *shapes.placed.shape)),
+            scenes=np.tile(shapes.placed, (n if own_scenes else 0, 1, 1)),
             goal=goals.copy(),
             observation=np.zeros((n, n_observations)),
             distance=np.zeros(n),

@@ -17,7 +17,6 @@ from kinarm.chain import within_limits
 from kinarm.envs.rendering import RENDER_MODES, EnvPictures
 from kinarm.episodes import Episodes, StepResult
 from kinarm.errors import InvalidInputError, UnknownNameError, one_or_many
-from kinarm.motion_contact import contact_in_motion
 from kinarm.observation import Ranges, observation_bounds
 from kinarm.problem import ProblemLike, ReachProblem
 from kinarm.scenarios import ScenarioQueues
@@ -214,24 +213,15 @@ class ArmEnvironment(Lifecycle):
         return self._episodes
 
     def _find_contacts(self, episodes: Episodes, result: StepResult) -> None:
-        """Fill in the numbers of the first contacts of a step that are not known yet.
-
-        Only configurations with a set bit of ``doubt`` can touch.
-        """
+        """Fill in the numbers of the first contacts of a step that are not known yet."""
         contact, refused, world = result.contact, result.collision, self.simulator.world
         if np.count_nonzero(refused) == np.count_nonzero(contact):
             return
-        for row in (refused & (contact == 0)).nonzero()[0].tolist():
-            model = world.contact_model.of_row(episodes.scenes, row)
-            motion = episodes.q[row], episodes.target[row]
-            if world.rules.tested == 0:
-                found = contact_in_motion(model, *motion)
-                contact[row] = self.contact_names.index(found.pair if found else None)
-                continue
-            (way,) = world.substeps(*(each[None] for each in motion))
-            tested = (q for k, q in enumerate(way) if episodes.doubt[row] >> k & 1)
-            pairs = map(model.first_in_contact, tested)
-            contact[row] = next((index + 1 for index in pairs if index is not None), 0)
+        rows = np.flatnonzero(refused & (contact == 0))
+        ways = episodes.q[rows], episodes.target[rows], episodes.scenes_at(rows)
+        for row, step in zip(rows, world.steps_of(*ways, episodes.steps[rows] - 1), strict=True):
+            found = world.contact_of_step(step)
+            contact[row] = self.contact_names.index(found.pair if found else None)
 
     def _make_interface(self, simulator: Simulator, dtype: DTypeLike) -> Interface:
         return Interface(simulator, dtype)

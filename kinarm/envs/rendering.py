@@ -115,7 +115,8 @@ class EnvPictures:
         for row in np.flatnonzero(episodes.status == COLLISION).tolist():
             if row not in self._contacts:
                 world = self._simulator.world.in_scene(self._starts[row], episodes.goal[row])
-                self._contacts[row] = world.contact(episodes.q[row], episodes.target[row])
+                refused, step = (episodes.q[row], episodes.target[row]), int(episodes.steps[row])
+                self._contacts[row] = world.contact(*refused, step=step - 1)
         if self.mode == "human":
             stage = self._live_stage()
             stage.show(episodes.q[0])

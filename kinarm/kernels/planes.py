@@ -6,8 +6,8 @@ the least height of the second, the mover, above it bounds their distance from
 below. A half-space's plane is its surface.
 
 A plane has five entries: unit normal x, y, z in the frame that carries it (the
-world's for bodies of the scene), offset along the normal, and the mover's least
-height when last asked for [m].
+world's for bodies of the scene that rest), offset along the normal, and the
+mover's least height when last asked for [m].
 
 The best plane follows from the distance algorithm of Gilbert, Johnson and Keerthi. In the carrier's
 frame it looks for the point closest to the origin of all differences of points of mover and
@@ -48,6 +48,12 @@ COARSE = 0.02
 def is_placed(shapes: ContactShapes, frame: int, poses: Array) -> bool:
     """Whether a frame is that of a body of the scene, whose row has a size."""
     return frame >= poses.shape[0] - shapes.placed.shape[0]
+
+
+@inlined
+def in_world(shapes: ContactShapes, pair: int) -> bool:
+    """Whether the world carries a pair's plane."""
+    return shapes.planes[pair, 4] == 0
 
 
 @inlined
@@ -107,7 +113,11 @@ def propose(shapes: ContactShapes, pair: int, poses: Array, plane: Array, row: i
     kind, carrier, mover = shapes.pairs[pair, 0], shapes.planes[pair, 0], shapes.planes[pair, 1]
     frame = shapes.bodies[carrier, 2]
     if kind == WITH_HALFSPACE:
-        x, y, z, offset = surface(poses, frame)
+        if in_world(shapes, pair):
+            x, y, z, offset = surface(poses, frame)
+        else:
+            none = 0.0 * poses[frame, 13]
+            x, y, z, offset = none, none, none + 1.0, none
         plane[row, 0], plane[row, 1], plane[row, 2], plane[row, OFFSET] = x, y, z, offset
         return
     a, b = axis_in_world(shapes, mover, poses)
@@ -130,8 +140,9 @@ def propose(shapes: ContactShapes, pair: int, poses: Array, plane: Array, row: i
     if is_placed(shapes, frame, poses):
         sx, sy, sz = poses[frame, 0], poses[frame, 1], poses[frame, 2]
         above = poses[frame, 3] - lowest(shapes, proxy, -sx * x, -sy * y, -sz * z)
-        x, y, z = rotated(poses, frame, x, y, z)
-        above += x * poses[frame, 13] + y * poses[frame, 14] + z * poses[frame, 15]
+        if in_world(shapes, pair):
+            x, y, z = rotated(poses, frame, x, y, z)
+            above += x * poses[frame, 13] + y * poses[frame, 14] + z * poses[frame, 15]
     else:
         above = shapes.rounding[proxy] - lowest(shapes, proxy, -x, -y, -z)
     plane[row, 0], plane[row, 1], plane[row, 2], plane[row, OFFSET] = x, y, z, above
@@ -200,8 +211,10 @@ def separate(
     corners, widened, sx, sy, sz = shapes.corners, shapes.rounding[carrier], 1.0, 1.0, 1.0
     nx, ny, nz = plane[0, 0], plane[0, 1], plane[0, 2]
     placed = is_placed(shapes, base, poses)
+    turned = placed and in_world(shapes, pair)
     if placed:
         sx, sy, sz, widened = poses[base, 0], poses[base, 1], poses[base, 2], poses[base, 3]
+    if turned:
         nx, ny, nz = rotated_back(poses, base, nx, ny, nz)
     rounding = widened + shapes.rounding[mover]
     best, size, norm = -math.inf, 0, math.inf
@@ -231,7 +244,7 @@ def separate(
         if norm < CLOSE:
             break
         nx, ny, nz = x / norm, y / norm, z / norm
-    if placed:
+    if turned:
         x, y, z = rotated(poses, base, plane[0, 0], plane[0, 1], plane[0, 2])
         plane[0, OFFSET] += x * poses[base, 13] + y * poses[base, 14] + z * poses[base, 15]
         plane[0, 0], plane[0, 1], plane[0, 2] = x, y, z

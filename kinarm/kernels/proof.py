@@ -1,11 +1,11 @@
 """Proof that steps are free of contact, or that bodies touch, for a block of episodes.
 
 A step moves the arm from q to q' and is tested at n configurations q + k/n (q' - q); n = 0 stands
-for all of its motion, in `INTERVALS`. The height h of the second body of a pair above the plane of
-the first (`kinarm.kernels.planes`) is known at q. Along the step it is the least height of some
-corners, whose second derivative is bounded by a *bend* c: at the share s it is at least
-(1 - s) h + s h' - s (1 - s) c / 2. Where that proves nothing, a better plane is taken, and then
-each configuration or interval between.
+for all of its motion, in `INTERVALS`. Bodies of the scene that move do so straight. The height h of
+the second body of a pair above the plane of the first (`kinarm.kernels.planes`) is known at q.
+Along the step it is the least height of some corners, whose second derivative is bounded by a
+*bend* c: at the share s it is at least (1 - s) h + s h' - s (1 - s) c / 2. Where that proves
+nothing, a better plane is taken, and then each configuration or interval between.
 """
 
 from kinarm.chain import Chain
@@ -144,35 +144,41 @@ def prove_alone(
     chain: Chain,
     shapes: ContactShapes,
     tested: int,
+    before: Array,
     poses: Array,
     block: Block,
     alone: Alone,
 ) -> int:
     """Prove what `prove_step` has not of an episode's step, and better its planes.
 
-    Returns a number whose bit k - 1 is set if configuration, or interval, k is not proven free.
+    Poses are ``before`` the step and at the target. Returns a number whose bit k - 1 is set if
+    configuration, or interval, k is not proven free.
     """
     plane, planes = alone.plane, as_numbers(block.planes)
     heights, bends = as_numbers(block.height), as_numbers(block.bend)
     # Better the planes of pairs that are not proven, and list those that remain.
     take_rows(poses, lane, alone.after)
+    for k in range(shapes.moving.shape[0]):
+        frame = poses.shape[0] - shapes.placed.shape[0] + shapes.moving[k]
+        for i in range(3):
+            alone.moved[k, i] = as_numbers(before)[frame, 13 + i, lane]
+            alone.moved[k, 3 + i] = as_numbers(poses)[frame, 13 + i, lane]
     at_start, n_open, all_open = False, 0, 0
     for pair in range(shapes.planes.shape[0]):
         if is_apart(as_numbers(block.bound)[pair, lane]):
             continue
         bend = bends[pair, lane]
-        before, after = heights[pair, lane], planes[pair, GAP, lane]
-        unproven = open_parts(before, after, bend, tested)
+        first, last = heights[pair, lane], planes[pair, GAP, lane]
+        unproven = open_parts(first, last, bend, tested)
         if unproven != 0 and shapes.pairs[pair, 0] != WITH_HALFSPACE:
             if not at_start:
-                take(block.q, 0, lane, alone.q, 0)
-                forward_kinematics(chain, alone.q, 0, alone.before)
+                place_between(0, 1, lane, chain, shapes, block, alone, alone.before)
                 at_start = True
             take(block.planes, pair, lane, plane, 0)
-            after = separate(shapes, pair, alone.after, alone.relative, alone.simplex, plane)
-            before = height_above(shapes, pair, FINE, alone.before, plane, 0)
-            unproven = open_parts(before, after, bend, tested)
-            heights[pair, lane] = before
+            last = separate(shapes, pair, alone.after, alone.relative, alone.simplex, plane)
+            first = height_above(shapes, pair, FINE, alone.before, plane, 0)
+            unproven = open_parts(first, last, bend, tested)
+            heights[pair, lane] = first
             put(plane, 0, block.planes, pair, lane)
         alone.listed[n_open, 0], alone.listed[n_open, 1] = pair, unproven
         n_open += 0 if unproven == 0 else 1
@@ -216,8 +222,8 @@ def is_part_free(
     """
     bends = as_numbers(block.bend)
     if tested == 0:
-        place_between(k - 1, parts, lane, chain, block, alone, alone.after)
-    place_between(k, parts, lane, chain, block, alone, alone.before)
+        place_between(k - 1, parts, lane, chain, shapes, block, alone, alone.after)
+    place_between(k, parts, lane, chain, shapes, block, alone, alone.before)
     for index in range(n_open):
         pair = alone.listed[index, 0]
         if alone.listed[index, 1] & bit != 0:
@@ -250,7 +256,14 @@ def is_proven_apart(
 
 @inlined
 def place_between(
-    k: int, parts: int, lane: int, chain: Chain, block: Block, alone: Alone, poses: Array
+    k: int,
+    parts: int,
+    lane: int,
+    chain: Chain,
+    shapes: ContactShapes,
+    block: Block,
+    alone: Alone,
+    poses: Array,
 ) -> None:
     """Fill in an episode's poses at configuration k of its step, where so many parts are over."""
     q, target = as_numbers(block.q), as_numbers(block.target)
@@ -258,6 +271,11 @@ def place_between(
         start, end = q[0, joint, lane], target[0, joint, lane]
         alone.q[0, joint] = end if k == parts else start + k / parts * (end - start)
     forward_kinematics(chain, alone.q, 0, poses)
+    for moving in range(shapes.moving.shape[0]):
+        frame = poses.shape[0] - shapes.placed.shape[0] + shapes.moving[moving]
+        for i in range(3):
+            start, end = alone.moved[moving, i], alone.moved[moving, 3 + i]
+            poses[frame, 13 + i] = end if k == parts else start + k / parts * (end - start)
 
 
 @helper
@@ -321,7 +339,7 @@ def first_contact(
     while doubt >> (k - 1) & 1 == 0:
         k += 1
     parts = tested if tested > 0 else INTERVALS
-    place_between(k, parts, lane, chain, block, alone, alone.before)
+    place_between(k, parts, lane, chain, shapes, block, alone, alone.before)
     enough = DEPTH if tested > 0 else -SURE_CONTACT
     for pair in range(shapes.pairs.shape[0]):
         if overlap(shapes, pair, alone.before) > enough:

@@ -25,6 +25,7 @@ from kinarm.kernels.reward import add_reward, observe
 from kinarm.kernels.session import (
     Session,
     load_episode,
+    move_bodies,
     put,
     put_scene,
     store_episode,
@@ -36,12 +37,12 @@ from kinarm.kernels.session import (
 
 @lean_kernel
 def begin(counters: NDArray[np.int64], session: Session, rows: NDArray[np.int64]) -> int:
-    """Start episodes at their ``q`` and ``goal``; ``rows``, shape (n,), tells which.
+    """Start episodes at their ``q``, ``goal`` and ``steps``; ``rows``, shape (n,), tells which.
 
     Returns how many pause, as not proven free. Threads may share them as in `advance`.
     """
     block, alone = session.block, session.alone
-    chain, shapes, episodes = session.chain, session.shapes, session.episodes
+    chain, shapes, rules, episodes = session.chain, session.shapes, session.rules, session.episodes
     q, path = episodes.q, episodes.path
     distances, n_paused = as_numbers(block.distance), 0
     while True:
@@ -55,6 +56,9 @@ def begin(counters: NDArray[np.int64], session: Session, rows: NDArray[np.int64]
             put(q, e, block.q, 0, lane)
             put(episodes.goal, e, block.goal, 0, lane)
             put_scene(episodes.scenes, e, lane, block.after)
+            if episodes.scenes.shape[0] > 0:
+                step = episodes.steps[e]
+                move_bodies(e, step, lane, shapes, rules, episodes.scenes, block.after)
         forward_kinematics(chain, block.q, 0, block.after)
         free = prove_configurations(shapes, 0, filled, block, alone)
         arm = block.after[: q.shape[1] + 1]
@@ -64,7 +68,6 @@ def begin(counters: NDArray[np.int64], session: Session, rows: NDArray[np.int64]
             e = rows[start + lane]
             episodes.status[e] = RUNNING if free >> lane & 1 else PAUSED
             n_paused += 0 if free >> lane & 1 else 1
-            episodes.steps[e] = 0
             episodes.total[e] = 0.0
             episodes.cleared[e] = False
             episodes.distance[e] = distances[0, lane]
@@ -102,7 +105,7 @@ def advance(counters: NDArray[np.int64], session: Session) -> int:
                 waiting = next_waiting(counters, episodes)
                 if waiting < n_episodes:
                     row[lane] = waiting
-                    load_episode(waiting, lane, control, episodes, block)
+                    load_episode(waiting, lane, shapes, rules, control, episodes, block)
                     n_alive += 1
                     changed = True
         if n_alive == 0:
@@ -121,6 +124,11 @@ def advance(counters: NDArray[np.int64], session: Session) -> int:
         # Prove the steps free: together, then by new planes, then one by one.
         before, poses = poses, before
         forward_kinematics(chain, block.target, 0, poses)
+        if shapes.moving.shape[0] > 0:
+            for lane in range(row.shape[0]):
+                if row[lane] >= 0:
+                    step = int(as_numbers(block.steps)[0, lane]) + 1
+                    move_bodies(row[lane], step, lane, shapes, rules, episodes.scenes, poses)
         unproven = ~is_apart(prove_step(shapes, rules.tested, poses, block)) & fresh
         if any_lane(unproven):
             if changed:
@@ -134,7 +142,7 @@ def advance(counters: NDArray[np.int64], session: Session) -> int:
                     continue
                 if episodes.scenes.shape[0] > 0:
                     place_bodies(episodes.scenes[row[lane]], alone.before)
-                doubt = prove_alone(lane, chain, shapes, rules.tested, poses, block, alone)
+                doubt = prove_alone(lane, chain, shapes, rules.tested, before, poses, block, alone)
                 if doubt != 0:
                     # The episode leaves the block, at its end or to wait for Coal.
                     e, row[lane] = row[lane], -1

@@ -90,6 +90,8 @@ def layouts(
         "q": (ONE, n_joints),
         **dict.fromkeys(("before", "after"), (n_joints + 1 + n_placed, Fixed(POSE))),
         "plane": (ONE, Fixed(PLANE)),
+        # Where bodies of the scene that move are before and after the step [m].
+        "moved": (n_placed, Fixed(6)),
         # See `kinarm.kernels.planes.separate`.
         "relative": (ONE, Fixed(POSE)),
         "simplex": (Fixed(4), THREE),
@@ -145,7 +147,27 @@ def put_scene(scenes: Array, e: int, lane: int, poses: Array) -> None:
 
 
 @inlined
-def load_episode(e: int, lane: int, control: Control, episodes: Episodes, block: Block) -> None:
+def move_bodies(
+    e: int, step: int, lane: int, shapes: ContactShapes, rules: Rules, scenes: Array, poses: Array
+) -> None:
+    """Put an episode's moving bodies where they are after so many steps, in a lane of poses."""
+    numbers, first = as_numbers(poses), poses.shape[0] - shapes.placed.shape[0]
+    for k in range(shapes.moving.shape[0]):
+        body = shapes.moving[k]
+        for i in range(3):
+            numbers[first + body, 13 + i, lane] = scenes[e, body, 13 + i] + rules.moves[step, k, i]
+
+
+@inlined
+def load_episode(
+    e: int,
+    lane: int,
+    shapes: ContactShapes,
+    rules: Rules,
+    control: Control,
+    episodes: Episodes,
+    block: Block,
+) -> None:
     """Put an episode into a lane; its observation only if needed."""
     put(episodes.q, e, block.q, 0, lane)
     put(episodes.target, e, block.target, 0, lane)
@@ -155,8 +177,9 @@ def load_episode(e: int, lane: int, control: Control, episodes: Episodes, block:
     for pair in range(episodes.planes.shape[1]):
         put(episodes.planes[e], pair, block.planes, pair, lane)
     if episodes.scenes.shape[0] > 0:
-        put_scene(episodes.scenes, e, lane, block.before)
-        put_scene(episodes.scenes, e, lane, block.after)
+        for poses in (block.before, block.after):
+            put_scene(episodes.scenes, e, lane, poses)
+            move_bodies(e, episodes.steps[e], lane, shapes, rules, episodes.scenes, poses)
     if block.weights.shape[1] > 0:
         put(control.weights, control.policy[e], block.weights, 0, lane)
     for power in range(2):

@@ -72,8 +72,8 @@ class TrainingArms:
         self._mean, self._scale = state.normalizer.mean, input_scale(state.normalizer.std)
         self.reach_within(config.tolerance_at(done))
         begun = EpisodeStates._make(map(np.copy, state.episodes))
-        self.episodes = self.simulator.reset(begun.q, begun.goal, origins=begun.start)
-        self.episodes.steps[:] = begun.steps
+        scenarios, start, taken = (begun.q, begun.goal), begun.start, begun.steps
+        self.episodes = self.simulator.reset(*scenarios, origins=start, taken=taken)
         self._total, self._start, self._replayed = begun.total, begun.start, begun.replayed
         self.failed, self.time = state.failed, 0.0
         self.returns: list[NDArray[np.float64]] = []
