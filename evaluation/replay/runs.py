@@ -105,8 +105,8 @@ def follow(
     stage = LiveStage(server, simulator.problem, simulator.arm)
     for recording in recordings:
         stage.begin(recording.states[0], recording.goal)
-        for state in recording.states:
-            stage.show(state)
+        for step, state in enumerate(recording.states):
+            stage.show(state, step)
             time.sleep(SLOWDOWN * simulator.problem.stepping.time_step)
         points = [simulator.arm.tool_position(state) for state in recording.states]
         stage.draw_trace(points, recording.outcome)

@@ -119,7 +119,7 @@ class EnvPictures:
                 self._contacts[row] = world.contact(*refused, step=step - 1)
         if self.mode == "human":
             stage = self._live_stage()
-            stage.show(episodes.q[0])
+            stage.show(episodes.q[0], int(episodes.steps[0]))
             stage.draw_trace(*self._way(0))
             stage.pace(self._simulator.problem.stepping.time_step)
 
@@ -141,7 +141,9 @@ class EnvPictures:
         for row, (q, goal) in enumerate(zip(self._begun.q, self._begun.goal, strict=True)):
             trace, outcome = self._way(row)
             contact, render = self._contacts.get(row), self._renderer(row).render
-            pictures.append(render(q, goal, trace=trace, outcome=outcome, contact=contact))
+            time = self._begun.steps[row] * self._simulator.problem.stepping.time_step
+            shown = {"trace": trace, "outcome": outcome, "contact": contact, "time": time}
+            pictures.append(render(q, goal, **shown))
         return Pictures(pictures)
 
     def _renderer(self, row: int) -> "Renderer":

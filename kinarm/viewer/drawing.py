@@ -15,6 +15,7 @@ from meshcat.geometry import LineBasicMaterial, Object
 from numpy.typing import NDArray
 
 from kinarm.arm import Arm
+from kinarm.body_motion import BodyMotion
 from kinarm.episode_scenes import scene_of_episode
 from kinarm.kernels.compiling import Array
 from kinarm.problem import ReachProblem
@@ -233,13 +234,29 @@ def draw_surroundings(window: Visualizer, scene: Scene) -> None:
 
 
 def draw_random_bodies(
-    window: Visualizer, scene: Scene, arm: Arm, start: Array, goal: Array
-) -> None:
-    """Draw the random bodies of an episode, from its start [rad or m] and goal [m]."""
+    window: Visualizer, path: str, scene: Scene, arm: Arm, start: Array, goal: Array
+) -> dict[str, BodyMotion]:
+    """Draw the random bodies of an episode; return what moves, by the paths of all bodies.
+
+    Parameters
+    ----------
+    window, path, scene, arm
+        Where to draw, and what.
+    start, goal : ndarray, shape (n_joints,) and (3,)
+        Start [rad or m] and goal [m] of the episode.
+    """
+    fixed, places = len(scene.obstacles), {"obstacles": scene}
     if scene.random_bodies:
-        window["random"].delete()
-        drawn = scene_of_episode(scene, arm, start, goal).obstacles[len(scene.obstacles) :]
-        _draw_obstacles(window["random"], replace(scene, obstacles=drawn, random_bodies=()))
+        window[path].delete()
+        shown = scene_of_episode(scene, arm, start, goal)
+        places[path] = replace(shown, obstacles=shown.obstacles[fixed:])
+        _draw_obstacles(window[path], places[path])
+    return {
+        f"{place}/{number}": body.motion
+        for place, there in places.items()
+        for number, body in enumerate(there.bodies[: len(there.obstacles)])
+        if body.motion
+    }
 
 
 def _draw_obstacles(window: Visualizer, scene: Scene) -> None:

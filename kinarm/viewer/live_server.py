@@ -14,6 +14,7 @@ import pinocchio as pin
 from numpy.typing import ArrayLike, NDArray
 
 from kinarm.arm import Arm
+from kinarm.body_motion import BodyMotion
 from kinarm.errors import OutputError, whole_number
 from kinarm.problem import ReachProblem
 from kinarm.viewer.camera import stage_scale
@@ -129,7 +130,7 @@ class LiveStage:
 
     def __init__(self, server: LiveServer, problem: ReachProblem, arm: Arm) -> None:
         self.server, self._arm, self._data = server, arm, arm.model.createData()
-        self._scene = problem.scene
+        self._problem, self._moving = problem, dict[str, BodyMotion]()
         self._due, self._scale = 0.0, stage_scale(arm, problem.scene)
         window = server.window
         draw_surroundings(window, problem.scene)
@@ -143,11 +144,16 @@ class LiveStage:
         place[:3, 3] = goal
         self.server.window["goal"].set_transform(place)
         self.server.window["trace"].delete()
-        draw_random_bodies(self.server.window, self._scene, self._arm, configuration, place[:3, 3])
+        shown = self.server.window, "random", self._problem.scene, self._arm
+        self._moving = draw_random_bodies(*shown, configuration, place[:3, 3])
         self.show(configuration)
 
-    def show(self, configuration: NDArray[np.float64]) -> None:
-        """Move the arm to a configuration [rad or m]."""
+    def show(self, configuration: NDArray[np.float64], step: int = 0) -> None:
+        """Move the arm to a configuration [rad or m], and bodies to where they are after a step."""
+        for path, motion in self._moving.items():
+            place, time = np.eye(4), step * self._problem.stepping.time_step
+            place[:3, 3] = motion.offsets(np.array([time]))[0]
+            self.server.window[path].set_transform(place)
         pin.forwardKinematics(self._arm.model, self._data, configuration)
         for joint, frame in enumerate(self._frames, start=1):
             frame.set_transform(self._data.liMi[joint].homogeneous)

@@ -20,6 +20,7 @@ from numpy.typing import ArrayLike
 from kinarm._files import write_text
 from kinarm.arm import Arm
 from kinarm.arm_specification import ArmSpecification
+from kinarm.body_motion import BodyMotion
 from kinarm.collision import ContactModel
 from kinarm.enclosures import core
 from kinarm.errors import InvalidInputError
@@ -189,9 +190,11 @@ def replay_page(
     policies = dict.fromkeys(run.policy for runs in trials for run in runs)
     draw_stage(drawn.window, arm, scene)
     draw_goal(drawn.window["goal"], problem)
+    shown = []
     for number, runs in enumerate(trials):
-        episode = runs[0].states[0], runs[0].goal
-        draw_random_bodies(drawn.window[f"trials/{number}"], scene, arm, *episode)
+        episode = scene, arm, runs[0].states[0], runs[0].goal
+        moving = draw_random_bodies(drawn.window, f"trials/{number}/random", *episode)
+        shown.append(_trial_data(runs, moving))
         for name, run in zip(("run", "ghost"), runs, strict=False):
             points = np.array([arm.tool_position(state) for state in run.states])
             way = drawn.window[f"trials/{number}/{name}"]
@@ -200,7 +203,7 @@ def replay_page(
         **arm_data(arm, scene),
         "traceIndices": 6 * TRACE_SIDES,
         "colours": {name: f"#{colour:06x}" for name, colour in OUTCOME_COLOURS.items()},
-        "trials": [_trial_data(runs) for runs in trials],
+        "trials": shown,
         "groups": list(groups),
         "heading": heading,
     }
@@ -257,9 +260,11 @@ def _check_recordings(recordings: Sequence[Recording], ghosts: Sequence[Recordin
             )
 
 
-def _trial_data(runs: Sequence[Recording]) -> dict[str, Any]:
-    """A trial that was recorded, as JSON."""
+def _trial_data(runs: Sequence[Recording], moving: Mapping[str, BodyMotion]) -> dict[str, Any]:
+    """A trial that was recorded, and what moves in it, as JSON."""
     first, problem = runs[0], runs[0].problem
+    steps = np.arange(max(len(run.states) for run in runs), dtype=np.float64)
+    times = steps * problem.stepping.time_step
     return {
         "problem": problem.name,
         "trial": first.trial,
@@ -268,6 +273,7 @@ def _trial_data(runs: Sequence[Recording]) -> dict[str, Any]:
         "horizon": problem.task.horizon,
         "timeStep": problem.stepping.time_step,
         "floor": first.steps_lower_bound,
+        "moving": {path: motion.offsets(times).tolist() for path, motion in moving.items()},
         "runs": [
             {
                 **{name: getattr(run, name) for name in ("policy", "outcome", "contact")},

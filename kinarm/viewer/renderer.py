@@ -1,6 +1,7 @@
 """Pictures of an arm at work, in software: no display or OpenGL."""
 
 from collections.abc import Iterable
+from itertools import count
 
 import numpy as np
 import pinocchio as pin
@@ -112,6 +113,7 @@ class Renderer:
         trace: ArrayLike | None = None,
         outcome: str | None = None,
         contact: Contact | None = None,
+        time: float = 0.0,
     ) -> NDArray[np.uint8]:
         """Take a picture.
 
@@ -125,6 +127,8 @@ class Renderer:
             How the episode ended, if it has; colours trace and cube.
         contact : Contact, optional
             What would have touched; the bodies light up.
+        time : float
+            Since the episode began, for obstacles that move [s].
 
         Returns
         -------
@@ -137,7 +141,7 @@ class Renderer:
         way = finite_array("trace", np.empty((0, 3)) if trace is None else trace, (None, 3))
         if outcome is not None and outcome not in OUTCOMES:
             raise UnknownNameError("outcome", outcome, OUTCOMES)
-        surfaces = self._scene.surfaces(configuration, goal, way, outcome)
+        surfaces = self._scene.surfaces(configuration, goal, way, outcome, time)
         everywhere = np.zeros(len(surfaces.places), dtype=np.int64)
         transform(surfaces.places, everywhere, self._projection[None], surfaces.corners)
         nearness = self._floor_nearness.copy()
@@ -188,9 +192,13 @@ class TriangleScene:
         scene = problem.scene
         self.n_joints, self.scale = arm.n_joints, stage_scale(arm, scene)
         self._arm, self._data, self._links = arm, arm.model.createData(), link_joints(arm)
+        placed = scene.bodies[: len(scene.obstacles)]
+        self._motions = [body.motion for body in placed if body.motion]
+        frames = count(self.n_joints + 2)
         standing = [
-            (0, finish, mesh)
-            for meshes in obstacle_meshes(scene)
+            (frame, finish, mesh)
+            for body, meshes in zip(placed, obstacle_meshes(scene), strict=True)
+            for frame in [next(frames) if body.motion else 0]
             for finish, mesh in zip((BODY, SLAB), meshes, strict=False)
         ]
         parts = [*standing, *arm_parts(arm), (arm.n_joints + 1, CUBE, cube_mesh(scene))]
@@ -206,17 +214,17 @@ class TriangleScene:
         self._materials = np.repeat([self._owners.index(part[:2]) for part in parts], sizes)
 
     def surfaces(
-        self, configuration: Array, goal: Array, trace: Array, outcome: str | None
+        self, configuration: Array, goal: Array, trace: Array, outcome: str | None, time: float
     ) -> Surfaces:
         """All triangles in the world.
 
         Parameters
         ----------
-        configuration, goal, trace, outcome
+        configuration, goal, trace, outcome, time
             As for `kinarm.viewer.Renderer.render`.
         """
         places, normals = np.empty_like(self._vertices), np.empty_like(self._normals)
-        poses = self._poses(configuration, goal)
+        poses = self._poses(configuration, goal, time)
         transform(self._vertices, self._frames, poses, places)
         poses[:, :, 3] = 0.0
         transform(self._normals, self._frames, poses, normals)
@@ -240,14 +248,19 @@ class TriangleScene:
                 light[material] = channels(TOUCH_GLOW)
         return light
 
-    def _poses(self, configuration: Array, goal: Array) -> Array:
-        """Frames in the world, shape (n_joints + 2, 3, 4): world, joints, goal."""
+    def _poses(self, configuration: Array, goal: Array, time: float) -> Array:
+        """Frames in the world, shape (n_joints + 2 + n_moving, 3, 4).
+
+        World, joints, goal, and offsets of obstacles that move.
+        """
         pin.forwardKinematics(self._arm.model, self._data, configuration)
-        poses = np.zeros((self.n_joints + 2, 3, 4))
-        poses[0, :, :3] = poses[-1, :, :3] = np.eye(3)
+        poses = np.zeros((self.n_joints + 2 + len(self._motions), 3, 4))
+        poses[:, :, :3] = np.eye(3)
         for joint in range(1, self.n_joints + 1):
             poses[joint] = self._data.oMi[joint].homogeneous[:3]
-        poses[-1, :, 3] = goal
+        poses[self.n_joints + 1, :, 3] = goal
+        for pose, motion in zip(poses[self.n_joints + 2 :], self._motions, strict=True):
+            pose[:, 3] = motion.offsets(np.array([time]))[0]
         return poses
 
 

@@ -57,6 +57,11 @@ class ReplayStage extends Stage {
         this.traces[k].visible = at > 0;
       }
     });
+    for (const [path, offsets] of Object.entries(trial.moving)) {
+      const step = Math.min(Math.floor(time), Math.max(offsets.length - 2, 0));
+      const [before, after] = [offsets[step], offsets[Math.min(step + 1, offsets.length - 1)]];
+      this.find(...path.split("/")).position.fromArray(before.map((value, k) => value + (time - step) * (after[k] - value)));
+    }
     const main = trial.runs[0];
     const ended = time >= main.states.length - 1;
     this.start.root.visible = time > 0.5;
