@@ -6,6 +6,7 @@ from .arm_specification import arm_names as arm_names
 from .bodies import Body as Body
 from .bodies import HeldBody as HeldBody
 from .bodies import RandomBodies as RandomBodies
+from .body_motion import BodyMotion as BodyMotion
 from .clearance import Clearance as Clearance
 from .collision import Contact as Contact
 from .envs import ReachEnv as ReachEnv

@@ -1,6 +1,6 @@
 """How bodies of a scene move, as functions of the time since an episode began."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import pairwise
 
 import numpy as np
@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 from kinarm._fields import OPTIONAL, Checked
 from kinarm.errors import ProblemError
 
-FARTHEST = 1e4
-"""Largest entry of an offset, and of a velocity [m and m/s]."""
+FARTHEST, FASTEST = 1e4, 100.0
+"""Largest entries of offsets and velocities [m and m/s]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -41,8 +41,17 @@ class BodyMotion(Checked):
         times = [0.0, *(time for time, *_ in self.waypoints)]
         if any(later <= time for time, later in pairwise(times)):
             raise ProblemError(f"times of waypoints must rise from above 0 s, got {times[1:]}")
-        if np.abs([self.velocity, *(offset for _, *offset in self.waypoints)]).max() > FARTHEST:
-            raise ProblemError(f"offsets and velocities must be {FARTHEST:g} at most")
+        offsets = [part for _, *offset in self.waypoints for part in offset]
+        if max(map(abs, offsets), default=0.0) > FARTHEST or max(map(abs, self.velocity)) > FASTEST:
+            most = f"{FARTHEST:g} m, and velocities {FASTEST:g} m/s"
+            raise ProblemError(f"offsets of a motion must be at most {most}")
+
+    def reflected(self, signs: tuple[float, float, float]) -> "BodyMotion":
+        """The same motion, with these signs of x, y and z."""
+        sx, sy, sz = signs
+        x, y, z = self.velocity
+        ways = tuple((time, sx * x, sy * y, sz * z) for time, x, y, z in self.waypoints)
+        return replace(self, velocity=(sx * x, sy * y, sz * z), waypoints=ways)
 
     def offsets(self, times: NDArray[np.float64]) -> NDArray[np.float64]:
         """Where it is at times [s], less where it was at first, shape (n, 3) [m]."""

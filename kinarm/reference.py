@@ -75,9 +75,8 @@ class ReferenceSimulator:
             Start configuration [rad or m] and goal position [m].
         """
         self._begin(self._world.in_scene(start, goal).contact_model)
-        rows = np.tile(self.contact_model.shapes.placed, (self.task.horizon + 1, 1, 1))
-        moving = list(self._problem.scene.moving)
-        rows[:, moving, 13:] += self._problem.body_offsets(np.arange(len(rows)))
+        begun = self.contact_model.shapes.placed[list(self._problem.scene.moving), 13:]
+        positions = begun + self._problem.body_offsets(np.arange(self.task.horizon + 1))
         q, reward = np.array(start), self.task.reward
         observation, distance = self.observe(q, goal)
         path, observations = [q], [observation]
@@ -88,8 +87,7 @@ class ReferenceSimulator:
             target = q.copy()
             target[: self.step_limit.size] += action * self.step_limit
             target = np.clip(target, self.arm.lower, self.arm.upper)
-            bodies = rows[len(rewards) : len(rewards) + 2] if moving else None
-            contact = self.first_contact(q, target, bodies)
+            contact = self.first_contact(q, target, *positions[len(rewards) :][:2])
             before = distance
             if contact is None:
                 q = target
@@ -143,7 +141,7 @@ class ReferenceSimulator:
         return quaternions
 
     def first_contact(
-        self, q: Array, target: Array, bodies: Array | None = None
+        self, q: Array, target: Array, before: Array | None = None, after: Array | None = None
     ) -> tuple[str, str] | None:
         """First pair that touches at a step's tested configurations, or None.
 
@@ -151,19 +149,19 @@ class ReferenceSimulator:
         ----------
         q, target : ndarray, shape (n_joints,)
             Ends of the step [rad or m].
-        bodies : ndarray, shape (2, n_placed, 16), optional
-            Rows of the scene's bodies before and after it, if they move.
+        before, after : ndarray, shape (n_moving, 3), optional
+            Positions of the scene's moving bodies [m].
         """
         model, geometry, data = self.arm.model, self._geometry, self._geometry_data
         placed = list(geometry.geometryObjects)[self.arm.geometry.ngeoms :]
+        moving = [placed[k] for k in self._problem.scene.moving]
         for k in range(1, self.tested + 1):
-            share = k / self.tested
-            tested = target if k == self.tested else q + share * (target - q)
-            if bodies is not None:
-                ways = zip(placed, *bodies[:, :, 13:], strict=True)
-                for shape, start, end in ways:
-                    there = end if k == self.tested else start + share * (end - start)
-                    shape.placement = pin.SE3(shape.placement.rotation, there)
+            share, last = k / self.tested, k == self.tested
+            tested = target if last else q + share * (target - q)
+            if before is not None and after is not None:
+                positions = after if last else before + share * (after - before)
+                for shape, position in zip(moving, positions, strict=True):
+                    shape.placement = pin.SE3(shape.placement.rotation, position)
             start_anew(data.collisionRequests)
             if pin.computeCollisions(model, self._data, geometry, data, tested, True):
                 # Pairs are tested in order up to the first in contact.

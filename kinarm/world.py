@@ -81,7 +81,7 @@ class World(InverseKinematics):
         )
         self.has_random_bodies = bool(self.problem.scene.random_bodies)
         self._idle: list[tuple[Block, Alone]] = []
-        self._shares = np.arange(1, n_tested + 1)[:, None] / n_tested
+        self._shares = np.arange(1, n_tested + 1) / n_tested
 
     def _checked_starts(self) -> Array:
         """The task's starts, shape (n, n_joints), if all are possible [rad or m]."""
@@ -279,7 +279,7 @@ class World(InverseKinematics):
         """Describe the first contact of a step of `steps_of`, or return None."""
         if self.rules.tested == 0:
             return contact_in_motion(step)
-        asked = (step.at(share) for share in self._shares[:, 0].tolist())
+        asked = (step.at(share) for share in self._shares.tolist())
         contacts = (model.contact(q) for model, q in asked)
         return next((contact for contact in contacts if contact), None)
 
@@ -331,9 +331,7 @@ class World(InverseKinematics):
         """
         if self.rules.tested == 0:
             return motions_in_contact(self.steps_of(starts, ends, scenes, taken), doubt)
-        before, after = (self.moved(scenes, taken + k).reshape(len(scenes), -1) for k in (0, 1))
-        shape = (len(scenes), len(self._shares), *scenes.shape[1:])
-        there = self.substeps(before, after).reshape(shape)
+        there = self.substeps(self.moved(scenes, taken), self.moved(scenes, taken + 1))
         return self.contact_model.first_contacts(self.substeps(starts, ends), doubt, there)
 
     def contact_pair(
@@ -347,9 +345,11 @@ class World(InverseKinematics):
         """Configurations at which the motion of a step is tested for contact.
 
         Takes ends of steps, shape (n, n_joints), and returns evenly spaced configurations, shape
-        (n, n_tested, n_joints), of which the last is the target [rad or m].
+        (n, n_tested, n_joints), of which the last is the target [rad or m]; likewise for rows of
+        bodies.
         """
-        ways = configurations[:, None] + self._shares * (targets - configurations)[:, None]
+        shares = self._shares.reshape(-1, *[1] * (targets.ndim - 1))
+        ways = configurations[:, None] + shares * (targets - configurations)[:, None]
         ways[:, -1] = targets
         return ways
 

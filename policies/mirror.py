@@ -160,8 +160,9 @@ def _outline(body: Body, signs: Point = (1.0, 1.0, 1.0)) -> tuple[Any, ...]:
             points = np.array([(0.0, 0.0, -length / 2), (0.0, 0.0, length / 2)])
         points = points @ rotation.T + centre
     rounded = np.round(points * signs, 9) + 0.0
+    motion = None if body.motion is None else body.motion.reflected(signs)
     radius = body.size[:1] if body.shape != "box" else ()
-    return body.shape, radius, frozenset(map(tuple, rounded.tolist()))
+    return body.shape, radius, frozenset(map(tuple, rounded.tolist())), motion
 
 
 def _reflected(lower: Point, upper: Point) -> tuple[Point, Point]:

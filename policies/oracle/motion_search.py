@@ -54,6 +54,7 @@ class MotionSearch:
     def __init__(self, simulator: Simulator, starts: Array, goals: Array) -> None:
         n = len(starts)
         self.simulator, self.starts, self.goals = simulator, starts, goals
+        self._resting = simulator.without_moving_bodies()
         self.witnesses = starts.copy()
         self.actions = np.zeros((n, simulator.task.horizon, simulator.n_actions))
         self.costs = np.full(n, np.inf)
@@ -85,7 +86,7 @@ class MotionSearch:
     def try_detours(self, rows: NDArray[np.int64]) -> None:
         """Plan detours where no motion reaches the goal yet."""
         for row in rows[~self.reached[rows]]:
-            ends = inverse_kinematics(self.simulator, self.starts[row], self.goals[row])
+            ends = inverse_kinematics(self._resting, self.starts[row], self.goals[row])
             if len(ends) == 0:
                 continue
             nearest = steps_between(self.simulator, self.starts[row], ends[0])
@@ -95,7 +96,7 @@ class MotionSearch:
             digest = hashlib.sha256(numbers.tobytes()).digest()
             rng = np.random.default_rng(np.frombuffer(digest, dtype=np.uint32))
             for _ in range(DETOURS):
-                path = find_detour(self.simulator, self.starts[row], ends, rng)
+                path = find_detour(self._resting, self.starts[row], ends, rng)
                 if path is None:
                     break
                 for through_corners in (False, True):
@@ -119,7 +120,7 @@ class MotionSearch:
     ) -> Solutions:
         """Try straight motions to the goals; owners count in ``rows``."""
         starts, goals, guesses = self.starts[rows], self.goals[rows], self.witnesses[rows]
-        found = solve_within(self.simulator, starts, goals, steps, tolerances, guesses, samples)
+        found = solve_within(self._resting, starts, goals, steps, tolerances, guesses, samples)
         owner, ends = found.owner, found.configurations
         due = steps[owner]
         motions = two_segments(self.simulator, starts[owner], ends, ends, due, due)

@@ -10,10 +10,10 @@ millimetre if the budget suffices. Both ignore contact, and hold with it all the
 more. Where the motion found is slower, contact raises the bound: no motion ends
 where the arm touches something, as far as its shapes are capsules. Boxes and
 distances are enlarged by 1e-9 to cover rounding. When a budget runs out, what
-is proven stands, marked as incomplete.
+is proven stands, marked as incomplete. Bodies that move raise no bound.
 
-Found, by search, and replayed in the simulator: a contact-free motion to the goal. It need not be
-the fastest, and finding none proves nothing.
+Found, by search, and replayed in the simulator, where bodies move: a contact-free motion to the
+goal. It need not be the fastest, and finding none proves nothing.
 """
 
 from collections.abc import Callable, Iterator
@@ -67,7 +67,7 @@ class Oracle:
 
     def __init__(self, problem: ProblemLike, *, threads: int | None = None) -> None:
         self.simulator = Simulator(problem, threads=threads)
-        self._prover = Prover(self.simulator)
+        self._prover = Prover(self.simulator.without_moving_bodies())
 
     def __repr__(self) -> str:
         return f"Oracle({self.simulator.problem!r})"
@@ -161,7 +161,7 @@ class Oracle:
         for row in range(len(starts)):
             alone = copy(self)
             alone.simulator = self.simulator.in_scene(starts[row], goals[row])
-            alone._prover = Prover(alone.simulator)
+            alone._prover = Prover(alone.simulator.without_moving_bodies())
             found.append(alone._solve_lot(starts[row : row + 1], goals[row : row + 1]))
         return found
 

@@ -23,7 +23,8 @@ def assert_equal_outcome(simulator, rollouts, i, episode, atol=1e-12):
     np.testing.assert_array_equal(rollouts.configurations[i], rollouts.paths[i, steps])
     if episode.collision:
         there = simulator.world.in_scene(rollouts.starts[i], rollouts.goals[i])
-        pair = there.contact_pair(rollouts.configurations[i], rollouts.targets[i])
+        refused = rollouts.configurations[i], rollouts.targets[i]
+        pair = there.contact_pair(*refused, step=steps - 1)
         assert pair == episode.contact
 
 

@@ -27,7 +27,7 @@ def prove(chain, shapes, tested, starts, targets, block, alone, bounds, found):
         block.distance[0], block.total[0] = first, second
         bounds[0, i] = as_numbers(block.distance)[0, 0]
         bounds[1, i] = as_numbers(block.total)[0, 0]
-        doubt = prove_alone(0, chain, shapes, tested, block.after, block, alone)
+        doubt = prove_alone(0, chain, shapes, tested, block.before, block.after, block, alone)
         found[0, i] = doubt
         if doubt != 0:
             found[1, i] = first_contact(0, doubt, chain, shapes, tested, block, alone)

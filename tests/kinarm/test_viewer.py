@@ -1,7 +1,5 @@
 """Pages: what they hold, that they are reproducible, and what they refuse; and meshes."""
 
-import base64
-import gzip
 import json
 import re
 import struct
@@ -10,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import umsgpack
-from drawings import volume
+from drawings import unpacked, volume
 
 import kinarm
 from kinarm.arm import Arm
@@ -43,11 +41,6 @@ def recordings(simulator):
 def changed(recording, **changes):
     """A recording as if another problem had been faced."""
     return replace(recording, problem=recording.problem.replace(**changes))
-
-
-def unpacked(page, name):
-    text = re.search(rf'id="data-{name}">([^<]*)<', page.html).group(1)
-    return gzip.decompress(base64.b64decode(text))
 
 
 def commands(page):
