@@ -22,8 +22,9 @@ def draw_scenarios(
     Goals are uniform over the task's regions. Each actuated joint starts
     uniformly within its limits, scaled by the start spread, or the arm starts
     at one of the task's configurations, without contact and farther from the
-    goal than the tolerance. If none is found in 2000 attempts, that is a
-    `kinarm.ProblemError`.
+    goal than the tolerance. If the task asks for it, goals without a free
+    configuration are drawn again. If none is found in 2000 attempts, that is
+    a `kinarm.ProblemError`.
 
     Parameters
     ----------
@@ -60,7 +61,8 @@ def draw_for_each(
     spread = task.start_spread if start_spread is None else start_spread
     lower = (arm.home + spread * (arm.lower - arm.home))[:n_actions]
     extent = (spread * (arm.upper - arm.lower))[:n_actions]
-    goals = world.goals.at(_draw(rngs, [count] * len(rngs), 1 + len(world.goals.moving)))
+    width = 1 + len(world.goals.moving)
+    goals = world.goals.at(_draw(rngs, [count] * len(rngs), width))
     listed = world.starts
     starts = np.tile(arm.home, (len(goals), 1))
     pending = np.arange(len(goals))
@@ -76,17 +78,48 @@ def draw_for_each(
         proposed = starts[pending]
         tools, touching = world.screened(proposed, world.scenes_of(proposed, aims))
         x, y, z = (tools - aims).T
-        pending = pending[touching | (np.sqrt(x * x + y * y + z * z) <= task.tolerance)]
+        rejected = touching | (np.sqrt(x * x + y * y + z * z) <= task.tolerance)
+        if task.reachable_goals:
+            missed = ~rejected
+            missed[missed] = ~have_solutions(world, proposed[missed], aims[missed])
+            rows = pending[missed]
+            wanted = np.bincount(rows // max(count, 1), minlength=len(rngs)).tolist()
+            goals[rows] = world.goals.at(_draw(rngs, wanted, width))
+            rejected |= missed
+        pending = pending[rejected]
         if pending.size == 0:
             shape = len(rngs), count
             return starts.reshape(*shape, arm.n_joints), goals.reshape(*shape, 3)
     pair = world.contact_model.contact_pair(starts[pending[0]])
     reason = f"{pair[0]} touches {pair[1]}" if pair else "the tool already is at the goal"
+    if task.reachable_goals and missed.any():
+        reason = "nothing free of contact is found at the goal"
     drawn_from = "from task.starts" if len(listed) else f"with start_spread {spread}"
     raise ProblemError(
         f"no contact-free start away from the goal found in {START_ATTEMPTS} attempts for arm "
         f"{arm.name!r} {drawn_from}; in the last one {reason}"
     )
+
+
+SOLUTIONS = (4, 64)
+"""Configurations at a goal that are tried in turn."""
+
+
+def have_solutions(world: World, starts: Array, goals: Array) -> NDArray[np.bool_]:
+    """Whether inverse kinematics finds what touches nothing at the goals of scenarios.
+
+    Takes starts, shape (n, n_joints) [rad or m], which decide about scenes, and goals, shape (n, 3)
+    [m].
+    """
+    found, scenes = np.zeros(len(goals), dtype=bool), world.scenes_of(starts, goals)
+    for most in SOLUTIONS:
+        rows = np.flatnonzero(~found)
+        solutions = world.inverse_kinematics(goals[rows], most=most)
+        owner = rows[solutions.owner]
+        there = scenes[owner] if len(scenes) else scenes
+        _, touching = world.screened(np.ascontiguousarray(solutions.configurations), there)
+        found[owner[~touching]] = True
+    return found
 
 
 def _draw(rngs: Sequence[np.random.Generator], counts: Sequence[int], width: int) -> Array:

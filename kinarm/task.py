@@ -123,6 +123,9 @@ class ReachTask(Checked):
         the whole range of every actuated joint, 0 always starts at home.
     starts : tuple
         Start configurations, each as likely, instead of that range [rad or m].
+    reachable_goals : bool
+        Draw scenarios again unless inverse kinematics finds a configuration at
+        the goal that touches nothing, with bodies where they are at first.
     reward : RewardWeights
         What is rewarded.
     """
@@ -133,6 +136,7 @@ class ReachTask(Checked):
     horizon: int = field(default=64, metadata={"at_most": LONGEST_HORIZON})
     start_spread: float = field(default=1.0, metadata=SHARE)
     starts: tuple[tuple[float, ...], ...] = field(default=(), metadata=OPTIONAL)
+    reachable_goals: bool = field(default=False, metadata=OPTIONAL)
     reward: RewardWeights = field(default_factory=RewardWeights)
 
     def __post_init__(self) -> None:

@@ -214,7 +214,12 @@ class TriangleScene:
         self._materials = np.repeat([self._owners.index(part[:2]) for part in parts], sizes)
 
     def surfaces(
-        self, configuration: Array, goal: Array, trace: Array, outcome: str | None, time: float
+        self,
+        configuration: Array,
+        goal: Array,
+        trace: Array,
+        outcome: str | None,
+        time: float = 0.0,
     ) -> Surfaces:
         """All triangles in the world.
 

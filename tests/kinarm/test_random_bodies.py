@@ -218,6 +218,35 @@ def test_environments_begin_in_the_scene_of_start_and_goal(changing, scenarios):
         env.reset(options={"start": scenarios[0][0]})
 
 
+def test_goals_are_reachable_where_a_task_asks_for_it():
+    """The oracle finds nothing at some goals among walls, but at all that are drawn so."""
+    walls = RandomBodies(
+        name="wall",
+        shape="box",
+        count=(2, 2),
+        smallest=(0.8, 0.02, 0.1),
+        largest=(0.8, 0.02, 0.5),
+        near="path",
+        lower=(-0.2, 0.0, 0.0),
+        upper=(0.2, 0.0, 0.2),
+        clear_of_goal=0.0,
+    )
+    crowded = problem(walls)
+    drawn = {}
+    for asked in (False, True):
+        simulator = Simulator(crowded.replace(reachable_goals=asked), threads=1)
+        scenarios = simulator.sample(np.random.default_rng(0), 24)
+        reasons = Oracle(simulator.problem, threads=1).solve_batch(*scenarios).reasons
+        drawn[asked] = sum("configuration at the goal" in each for each in reasons)
+    assert drawn[True] == 0 < drawn[False]
+
+
+def test_goals_that_nothing_reaches_are_refused():
+    far = PROBLEMS["both"].replace(reachable_goals=True, arm="so101")
+    with pytest.raises(KinarmError, match="nothing free of contact is found at the goal"):
+        Simulator(far).sample(np.random.default_rng(0), 10)
+
+
 def test_problems_survive_files(tmp_path):
     made = problem(seed=3).replace(name="drawn")
     made.save(tmp_path / "drawn.toml")
