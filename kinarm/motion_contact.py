@@ -49,18 +49,17 @@ def motions_in_contact(
     """
     touched, asked = np.zeros(len(doubt), dtype=np.int64), 0
     for row, step in enumerate(steps):
-        for k in np.flatnonzero(doubt[row] >> np.arange(INTERVALS) & 1).tolist():
-            low, high = k / INTERVALS, (k + 1) / INTERVALS
-            model, end = step.at(high)
-            # Mostly the end of an interval tells, which is asked sooner than when it began.
-            hit, more = model.first_in_contact(end) is not None, 0
-            if not hit:
-                share, more = first_share(step, low, high)
-                hit = share is not None
-            asked += 1 + more
+        open_parts = np.flatnonzero(doubt[row] >> np.arange(INTERVALS) & 1).tolist()
+        # Mostly the end of the last interval tells.
+        model, end = step.at((open_parts[-1] + 1) / INTERVALS)
+        hit = model.first_in_contact(end) is not None
+        asked += 1
+        for k in open_parts:
             if hit:
-                touched[row] = -1
                 break
+            share, more = first_share(step, k / INTERVALS, (k + 1) / INTERVALS)
+            hit, asked = share is not None, asked + more
+        touched[row] = -1 if hit else 0
     return touched, asked
 
 

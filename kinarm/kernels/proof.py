@@ -152,7 +152,8 @@ def prove_alone(
     """Prove what `prove_step` has not of an episode's step, and better its planes.
 
     Poses are ``before`` the step and at the target. Returns a number whose bit k - 1 is set if
-    configuration, or interval, k is not proven free.
+    configuration, or interval, k is not proven free. Of a step that is tested throughout, it is
+    minus the number, from 1, of a pair that touches at its end.
     """
     plane, planes = alone.plane, as_numbers(block.planes)
     heights, bends = as_numbers(block.height), as_numbers(block.bend)
@@ -167,6 +168,8 @@ def prove_alone(
     for pair in range(shapes.planes.shape[0]):
         if is_apart(as_numbers(block.bound)[pair, lane]):
             continue
+        if tested == 0 and overlap(shapes, pair, alone.after) > -SURE_CONTACT:
+            return -1 - pair
         bend = bends[pair, lane]
         first, last = heights[pair, lane], planes[pair, GAP, lane]
         unproven = open_parts(first, last, bend, tested)
@@ -335,6 +338,8 @@ def first_contact(
     Looks at the first configuration that ``doubt`` does not show as free. Of a step that is tested
     throughout, it is a pair that touches, perhaps not first.
     """
+    if doubt < 0:
+        return -doubt
     k = 1
     while doubt >> (k - 1) & 1 == 0:
         k += 1
