@@ -10,9 +10,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from kinarm._parallel import one_torch_thread, run_together
 from kinarm.arm import Arm
-from kinarm.chain import within_limits
 from kinarm.episodes import PAUSED, RUNNING, Control, Episodes, Rollouts, StepResult
-from kinarm.errors import LARGEST, InvalidInputError, StartInContactError, finite_array
+from kinarm.errors import InvalidInputError, StartInContactError, finite_array
 from kinarm.kernels.compiling import Array
 from kinarm.kernels.rollout import advance, allow_one_step, begin, refuse, results_of_step
 from kinarm.kernels.session import Session
@@ -154,8 +153,10 @@ class Simulator:
         taken : ndarray of int, shape (n,), or int
             Steps that they have taken before.
         """
-        scenarios = self.check_scenarios(starts, goals)
-        return self._begin(*scenarios, origins=origins, taken=taken, record=record)
+        episodes = self.world.episodes(*self.world.check_scenarios(starts, goals), record=record)
+        episodes.steps[:] = taken
+        self._start(np.arange(len(episodes.steps)), self._stepped(episodes), origins)
+        return episodes
 
     def step(self, episodes: Episodes, actions: ArrayLike) -> StepResult:
         """Advance every running episode by one step, in place.
@@ -198,13 +199,14 @@ class Simulator:
         shift : ndarray, shape (n_observations,), optional
             Collect moments of the observations about it.
         """
-        q, goal = self.check_scenarios(starts, goals)
+        q, goal = self.world.check_scenarios(starts, goals)
         if shift is not None:
             shift = finite_array("shift", shift, (self.n_observations,))
         if callable(policies) and not isinstance(policies, CompiledPolicy):
             if policy_index is not None:
                 raise InvalidInputError("policy_index does not apply to a function")
-            episodes = self._begin(q, goal, record=record, shift=shift)
+            episodes = self.world.episodes(q, goal, record=record, shift=shift)
+            self._start(np.arange(len(q)), self._stepped(episodes))
             self._follow(policies, episodes)
             return Rollouts.from_episodes(q, episodes)
         widths = (self.n_observations, self.n_actions)
@@ -229,7 +231,7 @@ class Simulator:
         starts, goals, record
             As for `reset`.
         """
-        q, goal = self.check_scenarios(starts, goals)
+        q, goal = self.world.check_scenarios(starts, goals)
         table = finite_array("actions", actions, (len(q), self.task.horizon, self.n_actions))
         episodes = self.world.episodes(q, goal, record=record)
         session = self.world.session(Control(actions=table), episodes)
@@ -246,28 +248,8 @@ class Simulator:
 
     def begin(self, episodes: Episodes, rows: NDArray[np.int64]) -> None:
         """Start episodes of some rows, in place, at their ``q`` and ``goal``."""
+        episodes.steps[rows] = 0
         self._start(rows, self._stepped(episodes))
-
-    def check_scenarios(self, starts: ArrayLike, goals: ArrayLike) -> tuple[Array, Array]:
-        """Copy starts and goals, or refuse them."""
-        q = finite_array("starts", starts, (None, self.arm.n_joints))
-        goal = finite_array("goals", goals, (len(q), 3))
-        if (farthest := np.abs(goal).max(initial=0.0)) > LARGEST:
-            raise InvalidInputError(f"goals must lie within {LARGEST:g} m, got {farthest:g}")
-        return within_limits("starts", q, self.arm.chain, self.arm.joint_names), goal
-
-    def _begin(
-        self,
-        starts: Array,
-        goals: Array,
-        *,
-        origins: Array | None = None,
-        taken: NDArray[np.int64] | int = 0,
-        **kept: Any,
-    ) -> Episodes:
-        episodes = self.world.episodes(starts, goals, **kept)
-        self._start(np.arange(len(starts)), self._stepped(episodes), origins, taken)
-        return episodes
 
     def _refilled(
         self, control: Control, starts: Array, goals: Array, shift: Array | None
@@ -288,15 +270,10 @@ class Simulator:
         return session.episodes
 
     def _start(
-        self,
-        rows: NDArray[np.int64],
-        session: Session,
-        origins: Array | None = None,
-        taken: NDArray[np.int64] | int = 0,
+        self, rows: NDArray[np.int64], session: Session, origins: Array | None = None
     ) -> None:
         """Start some episodes in their scenes; Coal decides about doubtful starts."""
         episodes, contacts = session.episodes, self.world.contact_model
-        episodes.steps[rows] = taken
         if self.world.has_random_bodies:
             begun = episodes.q[rows] if origins is None else origins
             episodes.scenes[rows] = self.world.scenes_of(begun, episodes.goal[rows])
@@ -307,9 +284,9 @@ class Simulator:
         touching = contacts.touching(episodes.q[paused], there)
         if touching.any():
             first = int(touching.argmax())
-            index, model = int(paused[first]), contacts.at(there[first]) if len(there) else contacts
-            pair = model.contact_pair(episodes.q[index])
-            raise StartInContactError(index, pair or ("arm", "scene"))
+            model = contacts.at(there[first]) if len(there) else contacts
+            pair = model.contact_pair(episodes.q[paused[first]])
+            raise StartInContactError(int(paused[first]), pair or ("arm", "scene"))
         episodes.status[paused] = RUNNING
 
     def _stepped(self, episodes: Episodes) -> Session:
@@ -344,10 +321,7 @@ class Simulator:
     def _decide(self, session: Session, paused: NDArray[np.int64]) -> NDArray[np.int64]:
         """Let Coal refuse steps in doubt; return which episodes go on."""
         episodes = session.episodes
-        motions = episodes.q[paused], episodes.target[paused]
-        doubt, scenes = episodes.doubt[paused], episodes.scenes_at(paused)
-        taken = episodes.steps[paused]
-        touched, asked = self.world.first_contacts(*motions, doubt, scenes, taken)
+        touched, asked = self.world.first_contacts(episodes, paused)
         self.checked_by_coal += asked
         refused = touched != 0
         resumed: NDArray[np.int64] = paused[~refused]

@@ -1,6 +1,5 @@
 """The world of a problem: arm, scene, and questions about configurations."""
 
-from collections.abc import Iterator
 from copy import copy
 from dataclasses import replace
 from functools import cached_property
@@ -13,11 +12,18 @@ from kinarm._parallel import available_threads, run_rows
 from kinarm.bodies import PARKED
 from kinarm.chain import Chain, within_limits
 from kinarm.clearance import Clearance, flattened, measure_clearance
-from kinarm.collision import Contact, ContactModel, Step
+from kinarm.collision import ContactModel
 from kinarm.contact_shapes import PLANE, ContactShapes
 from kinarm.episode_scenes import drawn_rows
 from kinarm.episodes import Control, Episodes, Rules
-from kinarm.errors import ProblemError, finite_array, one_or_many, whole_number
+from kinarm.errors import (
+    LARGEST,
+    InvalidInputError,
+    ProblemError,
+    finite_array,
+    one_or_many,
+    whole_number,
+)
 from kinarm.inverse_kinematics import InverseKinematics
 from kinarm.kernels.closest import Bodies
 from kinarm.kernels.compiling import Array
@@ -25,14 +31,14 @@ from kinarm.kernels.records import recorded
 from kinarm.kernels.rollout import begin
 from kinarm.kernels.screening import screen
 from kinarm.kernels.session import Alone, Block, Session, furnish, work_space
-from kinarm.motion_contact import contact_in_motion, motions_in_contact
 from kinarm.observation import observation_size
 from kinarm.problem import ProblemLike, ReachProblem
 from kinarm.scene_draws import SceneDraws
+from kinarm.step_contact import StepContact
 from kinarm.task import REWARD_TERMS, Goals
 
 
-class World(InverseKinematics):
+class World(InverseKinematics, StepContact):
     """An arm in a scene.
 
     Parameters
@@ -81,7 +87,6 @@ class World(InverseKinematics):
         )
         self.has_random_bodies = bool(self.problem.scene.random_bodies)
         self._idle: list[tuple[Block, Alone]] = []
-        self._shares = np.arange(1, n_tested + 1) / n_tested
 
     def _checked_starts(self) -> Array:
         """The task's starts, shape (n, n_joints), if all are possible [rad or m]."""
@@ -221,6 +226,14 @@ class World(InverseKinematics):
         other.contact_model = replace(model, shapes=model.shapes._replace(moving=none))
         return other
 
+    def check_scenarios(self, starts: ArrayLike, goals: ArrayLike) -> tuple[Array, Array]:
+        """Copy starts and goals, or refuse them."""
+        q = finite_array("starts", starts, (None, self.arm.n_joints))
+        goal = finite_array("goals", goals, (len(q), 3))
+        if (farthest := np.abs(goal).max(initial=0.0)) > LARGEST:
+            raise InvalidInputError(f"goals must lie within {LARGEST:g} m, got {farthest:g}")
+        return within_limits("starts", q, self.arm.chain, self.arm.joint_names), goal
+
     def clearance(self, configurations: ArrayLike) -> Clearance:
         """Measure how far the closest of the tested pairs is apart, and where.
 
@@ -248,110 +261,6 @@ class World(InverseKinematics):
         for row in np.flatnonzero(self.in_contact(q)):
             pairs[row] = self.contact_model.contact_pair(q[row])
         return tuple(pairs)
-
-    def contact(
-        self, configuration: ArrayLike, target: ArrayLike | None = None, *, step: int = 0
-    ) -> Contact | None:
-        """Describe the contact of a configuration, or the first one of a step; None if none.
-
-        Parameters
-        ----------
-        configuration : array_like, shape (n_joints,)
-            Where the arm is or the step begins [rad or m].
-        target : array_like, shape (n_joints,), optional
-            Where the step ends [rad or m].
-        step : int
-            Steps taken before, which tell where bodies are that move.
-        """
-        shapes, taken = self.contact_model.shapes, whole_number("step", step, 0)
-        q = finite_array("configuration", configuration, (self.arm.n_joints,))
-        scenes = shapes.placed[None] if len(shapes.moving) else self._no_scenes
-        if target is None:
-            there = self.moved(scenes, np.array([taken]))
-            return (self.contact_model.at(there[0]) if len(there) else self.contact_model).contact(
-                q
-            )
-        aim = finite_array("target", target, (self.arm.n_joints,))
-        (asked,) = self.steps_of(q[None], aim[None], scenes, np.array([taken]))
-        return self.contact_of_step(asked)
-
-    def contact_of_step(self, step: Step) -> Contact | None:
-        """Describe the first contact of a step of `steps_of`, or return None."""
-        if self.rules.tested == 0:
-            return contact_in_motion(step)
-        asked = (step.at(share) for share in self._shares.tolist())
-        contacts = (model.contact(q) for model, q in asked)
-        return next((contact for contact in contacts if contact), None)
-
-    def steps_of(
-        self, starts: Array, ends: Array, scenes: Array, taken: NDArray[np.int64]
-    ) -> Iterator[Step]:
-        """Steps of episodes.
-
-        Parameters
-        ----------
-        starts, ends : ndarray, shape (n, n_joints)
-            Where the arm moves [rad or m].
-        scenes : ndarray, shape (n, n_placed, 16) or (0, n_placed, 16)
-            Rows of the bodies when the episodes began, if they differ or move.
-        taken : ndarray of int, shape (n,)
-            Steps that the episodes have taken before.
-        """
-        ways = self.moved(scenes, taken), self.moved(scenes, taken + 1)
-        for row, (start, end) in enumerate(zip(starts, ends, strict=True)):
-            bodies = [way[row] for way in ways] if len(scenes) else []
-            yield Step(self.contact_model, start, end, *bodies)
-
-    def moved(self, scenes: Array, taken: NDArray[np.int64]) -> Array:
-        """Rows of the bodies of episodes after some steps; see `steps_of`."""
-        moving = self.contact_model.shapes.moving
-        if not len(scenes) or not len(moving):
-            return scenes
-        rows = scenes.copy()
-        rows[:, moving, 13:] += self.problem.body_offsets(taken)
-        return rows
-
-    def first_contacts(
-        self,
-        starts: Array,
-        ends: Array,
-        doubt: NDArray[np.int64],
-        scenes: Array,
-        taken: NDArray[np.int64],
-    ) -> tuple[NDArray[np.int64], int]:
-        """Let Coal decide about steps in doubt.
-
-        Parameters
-        ----------
-        starts, ends, scenes, taken
-            As for `steps_of`.
-        doubt
-            As for `kinarm.collision.ContactModel.first_contacts`, which tells
-            the results.
-        """
-        if self.rules.tested == 0:
-            return motions_in_contact(self.steps_of(starts, ends, scenes, taken), doubt)
-        there = self.substeps(self.moved(scenes, taken), self.moved(scenes, taken + 1))
-        return self.contact_model.first_contacts(self.substeps(starts, ends), doubt, there)
-
-    def contact_pair(
-        self, configuration: ArrayLike, target: ArrayLike | None = None, *, step: int = 0
-    ) -> tuple[str, str] | None:
-        """Names of the bodies of what `contact` describes, or None."""
-        contact = self.contact(configuration, target, step=step)
-        return contact.pair if contact else None
-
-    def substeps(self, configurations: Array, targets: Array) -> Array:
-        """Configurations at which the motion of a step is tested for contact.
-
-        Takes ends of steps, shape (n, n_joints), and returns evenly spaced configurations, shape
-        (n, n_tested, n_joints), of which the last is the target [rad or m]; likewise for rows of
-        bodies.
-        """
-        shares = self._shares.reshape(-1, *[1] * (targets.ndim - 1))
-        ways = configurations[:, None] + shares * (targets - configurations)[:, None]
-        ways[:, -1] = targets
-        return ways
 
     def episodes(
         self, starts: Array, goals: Array, *, record: bool = False, shift: Array | None = None

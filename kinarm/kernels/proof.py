@@ -14,14 +14,7 @@ from kinarm.kernels.compiling import Array, helper, inlined
 from kinarm.kernels.kinematics import forward_kinematics
 from kinarm.kernels.lanes import any_lane, as_numbers, lane_bits, select
 from kinarm.kernels.overlap import DEPTH, overlap
-from kinarm.kernels.planes import (
-    EVERYDAY,
-    FINE,
-    GAP,
-    height_above,
-    propose,
-    separate,
-)
+from kinarm.kernels.planes import EVERYDAY, FINE, GAP, height_above, propose, separate
 from kinarm.kernels.session import Alone, Block, put, take, take_rows
 
 MARGIN = 2e-6

@@ -280,7 +280,7 @@ class Session(Record):
         for own, other in parts:
             own[...] = other
         episodes.q[:], episodes.target[:], episodes.goal[:] = starts, starts, goals
-        episodes.touched[:] = 0
+        episodes.touched[:], episodes.steps[:] = 0, 0
         if shift is not None:
             episodes.shift[:], episodes.moments[:] = shift, 0.0
         return True

@@ -56,7 +56,7 @@ def inverse_kinematics(
     """
     q = finite_array("start", start, (simulator.arm.n_joints,))
     g = finite_array("goal", goal, (3,))
-    starts, goals = simulator.check_scenarios(q[None], g[None])
+    starts, goals = simulator.world.check_scenarios(q[None], g[None])
     horizon, tolerance = np.array([simulator.task.horizon]), np.array([simulator.task.tolerance])
     samples = whole_number("samples", samples, 1)
     if not separation > 0:
