@@ -1,8 +1,11 @@
 """Scenes of bodies of every shape."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from kinarm.bodies import SHAPES, Body
+from kinarm.body_motion import BodyMotion
 from kinarm.scene import PAPER_GOALS, Scene
 
 
@@ -19,11 +22,21 @@ def random_body(rng, name, shape, reach=0.8, largest=0.2):
     return Body(name=name, shape=shape, size=size, vertices=vertices, **pose)
 
 
-def random_scene(seed, count=8, shapes=tuple(SHAPES), ground=True, **settings):
-    """A scene of so many bodies, the shapes by turns, about the paper's goals."""
+def random_motion(rng):
+    """A drift, or a swing."""
+    if rng.random() < 0.5:
+        return BodyMotion(velocity=tuple(rng.uniform(-0.3, 0.3, 3)))
+    away = rng.uniform(-0.3, 0.3, 3)
+    return BodyMotion(waypoints=((0.9, *away), (1.7, 0, 0, 0)), periodic=True)
+
+
+def random_scene(seed, count=8, shapes=tuple(SHAPES), ground=True, moving=0, **settings):
+    """A scene of so many bodies, the shapes by turns, about the paper's goals; some move."""
     rng = np.random.default_rng(seed)
     bodies = [
         random_body(rng, f"{shapes[k % len(shapes)]} {k}", shapes[k % len(shapes)], **settings)
         for k in range(count)
     ]
+    for k in rng.permutation(count)[:moving]:
+        bodies[k] = replace(bodies[k], motion=random_motion(rng))
     return Scene(ground=ground, obstacles=bodies, goal_regions=PAPER_GOALS)

@@ -28,12 +28,17 @@ def assert_equal_outcome(simulator, rollouts, i, episode, atol=1e-12):
         assert pair == episode.contact
 
 
+def held_actions(simulator, rng, count, held=6):
+    """Random actions of episodes, each held for some steps."""
+    horizon = simulator.task.horizon
+    blocks = rng.uniform(-1.5, 1.5, (count, -(-horizon // held), simulator.n_actions))
+    return np.repeat(blocks, held, axis=1)[:, :horizon]
+
+
 def compare_actions(simulator, seed, count, held=6):
     rng = np.random.default_rng(seed)
-    horizon = simulator.task.horizon
     starts, goals = simulator.sample(rng, count)
-    blocks = rng.uniform(-1.5, 1.5, (count, -(-horizon // held), simulator.n_actions))
-    actions = np.repeat(blocks, held, axis=1)[:, :horizon]
+    actions = held_actions(simulator, rng, count, held)
     rollouts = simulator.rollout_actions(actions, starts, goals, record=True)
     reference = ReferenceSimulator(simulator)
     for i in range(count):
