@@ -10,7 +10,6 @@ of all files whose helpers and constants are compiled in.
 
 import gc
 import hashlib
-import pickle
 import sys
 from collections.abc import Callable
 from contextlib import suppress
@@ -21,9 +20,9 @@ from typing import Any, TypeVar, cast
 import llvmlite
 import numpy as np
 from numba import njit, types
-from numba.core.caching import FunctionCache, IndexDataCacheFile
+from numba.core.caching import FunctionCache
 from numba.core.codegen import JITCodeLibrary
-from numba.core.compiler import CompilerBase, DefaultPassBuilder
+from numba.core.compiler import Compiler
 from numpy.typing import NDArray
 
 from kinarm._console import COMPILING, doing
@@ -40,8 +39,8 @@ def kernel(function: Function) -> Function:
 
 
 def lean_kernel(function: Function) -> Function:
-    """Compile such a function that works in lanes and allocates nothing, faster."""
-    return _called_by_python(function, _nrt=False, pipeline_class=LeanCompiler)
+    """Compile such a function that works in lanes and allocates nothing."""
+    return _called_by_python(function, _nrt=False)
 
 
 def _called_by_python(function: Function, **more: Any) -> Function:
@@ -87,38 +86,6 @@ def _linked(function: Function, **more: Any) -> Function:
     return cast("Function", dispatcher)
 
 
-WITHOUT = {
-    "WithLifting",
-    "InlineClosureLikes",
-    "RewriteDynamicRaises",
-    "MakeFunctionToJitFunction",
-    "InlineInlinables",
-    "FindLiterallyCalls",
-    "LiteralUnroll",
-    "LiteralPropagationSubPipelinePass",
-    "InlineOverloads",
-    "NopythonRewrites",
-}
-"""Passes of Numba for what kernels lack, such as contexts, closures, error
-messages, literals and expressions of whole arrays. They take a twelfth of the
-time."""
-
-
-class LeanLibrary(JITCodeLibrary):
-    """Code of a kernel in lanes, optimised once: it has no reference counts to prune.
-
-    LLVM makes no vectors of loops: lanes are vectors.
-    """
-
-    def __init__(self, codegen: Any, name: str) -> None:
-        super().__init__(codegen, name)
-        self.enable_object_caching()
-
-    def _optimize_final_module(self) -> None:
-        passes, builder = self._codegen._module_pass_manager(loop_vectorize=False)
-        passes.run(self._final_module, builder)
-
-
 class LinkedLibrary(JITCodeLibrary):
     """Code to be linked into kernels, without machine code of its own."""
 
@@ -143,23 +110,11 @@ class LinkedLibrary(JITCodeLibrary):
         return 0
 
 
-class KernelCompiler(CompilerBase):
-    """Numba's compiler, which keeps nearly all, without garbage collection."""
-
-    library: type[JITCodeLibrary] | None = None
-    """Instead of Numba's own."""
-
-    def define_pipelines(self) -> list[Any]:
-        """Take Numba's passes that do something for kernels."""
-        passes = DefaultPassBuilder.define_nopython_pipeline(self.state)
-        passes.passes = [each for each in passes.passes if each[0].__name__ not in WITHOUT]
-        return [passes]
+class KernelCompiler(Compiler):
+    """Numba's compiler without garbage collection, which finds next to nothing there."""
 
     def compile_extra(self, func: Callable[..., Any]) -> Any:
         """Compile a function and its helpers."""
-        if self.library is not None:
-            codegen = self.state.targetctx.codegen()
-            self.state.library = self.library(codegen, func.__qualname__)
         collects = gc.isenabled()
         gc.disable()
         try:
@@ -170,49 +125,21 @@ class KernelCompiler(CompilerBase):
                 gc.enable()
 
 
-class LeanCompiler(KernelCompiler):
-    """Compiles a kernel into a `LeanLibrary`."""
-
-    library = LeanLibrary
-
-
 class HelperCompiler(KernelCompiler):
     """Compiles a helper into a `LinkedLibrary`."""
 
-    library = LinkedLibrary
-
-
-class CheckedFile(IndexDataCacheFile):
-    """Numba's files of a kernel's machine code, with a checksum: damage is noticed."""
-
-    def save(self, key: Any, data: Any) -> None:
-        """Save machine code for a signature and processor."""
-        content = self._dump(data)
-        super().save(key, (self._checksum(key, content), content))
-
-    def load(self, key: Any) -> Any:
-        """Load what was saved for them, None if nothing; damage raises an exception."""
-        found = super().load(key)
-        if found is None:
-            return None
-        checksum, content = found
-        if checksum != self._checksum(key, content):
-            raise ValueError("damaged machine code")
-        return pickle.loads(content)
-
-    def _checksum(self, key: Any, content: bytes) -> bytes:
-        return hashlib.sha256(repr((self._source_stamp, key)).encode() + content).digest()
+    def compile_extra(self, func: Callable[..., Any]) -> Any:
+        """Compile a function and its helpers."""
+        codegen = self.state.targetctx.codegen()
+        self.state.library = LinkedLibrary(codegen, func.__qualname__)
+        return super().compile_extra(func)
 
 
 class KernelCache(FunctionCache):
-    """A kernel's machine code on disk; damage costs only time.
+    """A kernel's machine code on disk; what cannot be read costs only time.
 
     Processes with the same sources and versions of Numba and llvmlite share it.
     """
-
-    def __init__(self, function: Callable[..., Any]) -> None:
-        super().__init__(function)
-        self._cache_file = CheckedFile(self._cache_path, self._impl.filename_base, "")
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
         """Look machine code up; None if it is missing or damaged."""

@@ -76,18 +76,11 @@ def value_of_one(package):
 
 
 def test_whatever_happens_to_the_files_kernels_work(package, value_of_one):
-    """A full disk leaves none; damaged ones, and a flipped bit of machine code, are noticed."""
+    """A full disk leaves none; what is cut off is made anew."""
     anew, found = (40.0, False), (40.0, True)
     assert [value_of_one("full"), value_of_one()] == [anew, anew]
 
-    (path,) = (package.parent / "cache").rglob("*.nbc")
-    content = bytearray(path.read_bytes())
-    # In the middle of an operation: unnoticed, the kernel would run and compute something else.
-    content[content.index(b"\x7fELF") + 256] ^= 1
-    path.write_bytes(content)
-    assert value_of_one() == anew
-
-    damaged = [path for path in path.parent.iterdir() if path.suffix in (".nbi", ".nbc")]
+    damaged = list((package.parent / "cache").rglob("*.nb[ic]"))
     assert damaged
     for each in damaged:
         each.write_bytes(each.read_bytes()[:-7])
