@@ -14,9 +14,6 @@ from kinarm.kernels.compiling import Array, Vector, inlined, kernel
 NEAR = 0.01
 """Distance from the camera below which corners do not bound a triangle [m]."""
 
-WIDE = 6
-"""Columns from which a row's reached ones are worth finding."""
-
 
 class Eye(NamedTuple):
     """From where a picture is seen.
@@ -57,17 +54,6 @@ def edge(a: Vector, b: Vector) -> Vector:
     ax, ay, aw = a
     bx, by, bw = b
     return ay * bw - by * aw, aw * bx - bw * ax, ax * by - bx * ay
-
-
-@inlined
-def _within(a: float, b: float, c: float, row: int, first: int, last: int) -> tuple[int, int]:
-    """Columns from first to last of a row where a x + b y + c may be 0 or more."""
-    most = b * (row + (1 if b > 0.0 else 0)) + c
-    if a > 0.0:
-        return max(first, math.floor(min(-most / a, last + 1.0)) - 1), last
-    if a < 0.0:
-        return first, min(last, math.floor(max(-most / a, first - 1.0)))
-    return (first, last) if most >= 0.0 else (first, first - 1)
 
 
 @kernel
@@ -139,12 +125,7 @@ def draw_view(
         ak, bk, ck = ak * scale, bk * scale, ck * scale
         # Samples within all edges, if nothing nearer is seen there.
         for row in range(top, bottom + 1):
-            first, last = left, right
-            if last - first > WIDE:
-                first, last = _within(ai, bi, ci, row, first, last)
-                first, last = _within(aj, bj, cj, row, first, last)
-                first, last = _within(ak, bk, ck, row, first, last)
-            for column in range(first, last + 1):
+            for column in range(left, right + 1):
                 for sample in range(n_samples):
                     x, y = column + offsets[sample, 0], row + offsets[sample, 1]
                     share_i = ai * x + bi * y + ci
