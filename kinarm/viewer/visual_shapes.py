@@ -60,15 +60,6 @@ logging.getLogger("trimesh").addHandler(logging.NullHandler())  # else it prints
 READERS = ("trimesh", "pycollada", "fast-simplification")
 """Packages of the extra ``robots`` that read and simplify meshes."""
 
-UNIVERSAL_ROBOTS = np.array(
-    [(0.49, 0.678, 0.8), (0.82, 0.82, 0.82), (0.279, 0.279, 0.279), (0.58, 0.58, 0.58), (0.1,) * 3]
-)
-"""Colours of the maker's caps, links, joints, rims and seals."""
-
-DIMMING, MOST_TIMES, SAME_COLOUR = 0.8, 6, 0.003
-"""The meshes in ``ur_description`` went through a modeller, some more often
-than others, which each time left them this share of their light."""
-
 
 class PaintedMesh(NamedTuple):
     """Triangles of one material with its colour 0xRRGGBB, None if unstated."""
@@ -281,7 +272,7 @@ def _pieces(path: Path, scale: Sequence[float]) -> list[PaintedMesh]:
         nodes = [scene.graph[node] for node in sorted(scene.graph.nodes_geometry)]
         pieces = [
             PaintedMesh(
-                _placed(scene.geometry[name], transform, scale), _colour(scene.geometry[name], path)
+                _placed(scene.geometry[name], transform, scale), _colour(scene.geometry[name])
             )
             for transform, name in nodes
             if len(getattr(scene.geometry[name], "faces", ()))
@@ -307,23 +298,13 @@ def _placed(geometry: Any, transform: NDArray[np.float64], scale: Sequence[float
     return Mesh(geometry.vertices, faces).moved(factors * transform[:3, 3], stretch)
 
 
-def _colour(geometry: Any, path: Path) -> int | None:
+def _colour(geometry: Any) -> int | None:
     """Colour of a geometry as 0xRRGGBB, or None."""
     look = geometry.visual
     if look.kind is None:
         return None
     colour = (look.material if look.kind == "texture" else look).main_color
-    return packed_colour(original_colour(path, np.asarray(colour[:3]) / 255))
-
-
-def original_colour(path: Path, colour: NDArray[np.float64]) -> NDArray[np.float64]:
-    """The maker's colour, shape (3,), for one that a mesh file states."""
-    if "ur_description" in path.parts:
-        for times in range(MOST_TIMES + 1):
-            apart = np.abs(UNIVERSAL_ROBOTS * DIMMING**times - colour).max(axis=1)
-            if apart.min() < SAME_COLOUR:
-                return np.array(UNIVERSAL_ROBOTS[apart.argmin()])
-    return colour
+    return packed_colour(np.asarray(colour[:3]) / 255)
 
 
 def _simplified(mesh: Mesh) -> Mesh:

@@ -13,12 +13,11 @@ from kinarm.arm import Arm
 from kinarm.errors import ArmError, MissingExtraError
 from kinarm.viewer import arm_page, visual_shapes
 from kinarm.viewer.meshes import Mesh, box
-from kinarm.viewer.parts import packed_colour, shape_finish
+from kinarm.viewer.parts import shape_finish
 from kinarm.viewer.visual_shapes import (
     TOLERANCE,
     arm_parts,
     collision_parts,
-    original_colour,
     read_mesh_file,
     visual_parts,
 )
@@ -170,15 +169,6 @@ class TestSimplification:
 
 
 class TestColours:
-    def test_universal_robots_are_not_dimmed(self, tmp_path):
-        path = tmp_path / "ur_description" / "a.dae"
-        for passes in (1, 2, 3):
-            dimmed = 0.8**passes * np.array([0.49, 0.678, 0.8])
-            assert packed_colour(original_colour(path, dimmed)) == 0x7DADCC
-            np.testing.assert_array_equal(original_colour(tmp_path / "a.dae", dimmed), dimmed)
-        other = np.array([0.9, 0.1, 0.1])
-        np.testing.assert_array_equal(original_colour(path, other), other)
-
     def test_which_colour_counts(self, tmp_path, make_joint, write_robot):
         """A file of several colours keeps them, else the URDF's goes before; the first one wins."""
         many = write_dae(tmp_path / "many.dae")
