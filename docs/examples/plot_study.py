@@ -13,7 +13,7 @@ trainings, judged on the same trials beside the oracle.
 import tempfile
 
 from kinarm.evaluation import Study
-from kinarm.evaluation.experiments.page import beside_bound, effects, learning_curves
+from kinarm.evaluation.experiments.page import effects, learning_curves
 
 study = Study(
     {
@@ -43,11 +43,6 @@ curves = learning_curves(study)
 # The mean over everything else that varies, with intervals over seeds and trials:
 
 panels = effects(study)
-
-# %%
-# All settings beside the bound:
-
-bars = beside_bound(study)
 
 # %%
 # ``study.table()`` has one row a training; ``kinarm-study`` does the same from a file, and writes a

@@ -2,7 +2,6 @@
 
 import json
 from collections.abc import Mapping, Sequence
-from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -10,7 +9,7 @@ import numpy as np
 import tomli_w
 from numpy.typing import NDArray
 
-from kinarm._files import write_atomically, write_text
+from kinarm._files import write_text
 from kinarm._tables import csv_text
 from kinarm.evaluation.curves import Band
 from kinarm.evaluation.experiments import table
@@ -27,13 +26,12 @@ if TYPE_CHECKING:
 
     from kinarm.evaluation.experiments.study import Study
 
-LINES, BARS = 8, 24
+LINES = 8
 """Most groups that a figure shows of a problem, the best ones."""
 
 TITLES = {
     "learning_curves": "Learning curves",
     "effects": "Effects",
-    "beside_bound": "Beside the bound",
 }
 
 
@@ -41,8 +39,7 @@ def write_all(study: "Study", command: str = "") -> Path:
     """Write the results of a study, and return the page.
 
     The files are ``index.html``, ``RESULTS.md``, ``results.json``,
-    ``runs.csv``, ``curves.csv``, ``runs.parquet`` if pyarrow is there, and the
-    figures; ``command`` is recorded.
+    ``runs.csv``, ``curves.csv`` and the figures; ``command`` is recorded.
 
     Raises
     ------
@@ -52,14 +49,6 @@ def write_all(study: "Study", command: str = "") -> Path:
     folder = study.store.folder
     write_csv(folder / "runs.csv", study.rows())
     write_csv(folder / "curves.csv", table.curve_rows(study))
-    if find_spec("pyarrow") is not None:
-        import pyarrow
-        import pyarrow.parquet
-
-        rows = study.table()
-        arrow = pyarrow.table({name: rows[name] for name in rows.dtype.names or ()})
-        path = folder / "runs.parquet"
-        write_atomically(path, lambda file: pyarrow.parquet.write_table(arrow, file))
     drawings = {}
     for name, figure in draw_all(study).items():
         _, drawn = save_figure(figure, folder, name)
@@ -140,7 +129,7 @@ def _page(name: str, study: "Study", document: dict[str, Any], drawings: Mapping
 
 def draw_all(study: "Study") -> dict[str, "Figure"]:
     """All figures that a study has data for, by name."""
-    figures = {draw.__name__: draw(study) for draw in (learning_curves, effects, beside_bound)}
+    figures = {draw.__name__: draw(study) for draw in (learning_curves, effects)}
     return {name: figure for name, figure in figures.items() if figure is not None}
 
 
@@ -265,25 +254,3 @@ def _whiskers(estimate: Estimate) -> list[list[float]]:
     value = estimate.value or 0.0
     low, high = estimate.ci95 or (value, value)
     return [[max(value - low, 0.0)], [max(high - value, 0.0)]]
-
-
-def beside_bound(study: "Study") -> "Figure | None":
-    """Success of each group with its 95 % interval, beside the oracle's."""
-    problems = {name: groups[:BARS] for name, groups in _by_problem(study).items()}
-    if not problems:
-        return None
-    heights = [0.6 + 0.28 * len(groups) for groups in problems.values()]
-    size = 8.0, 0.6 + sum(heights)
-    figure, panels = panels_figure(size, len(problems), 1, height_ratios=heights)
-    for (problem, groups), axes in zip(problems.items(), panels.flat, strict=True):
-        for row, group in enumerate(groups):
-            share = group.success.value or 0.0
-            axes.barh(row, share, height=0.62, color=COLOURS[0], alpha=0.35)
-            whiskers = _whiskers(group.success)
-            axes.errorbar(share, row, xerr=whiskers, fmt="|", color=COLOURS[0], capsize=3)
-        axes.axvline(groups[0].reachable, color="#444444", linestyle=":", lw=1.2)
-        axes.set_yticks(range(len(groups)), [group.label for group in groups], fontsize=8)
-        axes.invert_yaxis()
-        axes.set(xlim=(0, 1.02), title=problem)
-    panels[-1, 0].set_xlabel("share of trials with success; dotted: what the oracle reaches")
-    return figure

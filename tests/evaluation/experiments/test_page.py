@@ -7,9 +7,7 @@ import numpy as np
 import pytest
 from small_studies import SMALL
 
-from kinarm.evaluation.experiments import page
 from kinarm.evaluation.experiments.page import (
-    beside_bound,
     draw_all,
     effects,
     learning_curves,
@@ -96,19 +94,6 @@ class TestFiles:
         assert [row["key"] for row in rows] == table["key"].tolist()
         assert [float(row["success"]) for row in rows] == table["success"].tolist()
 
-    def test_parquet(self, folder, finished):
-        parquet = pytest.importorskip("pyarrow.parquet")
-        read = parquet.read_table(folder / "runs.parquet")
-        assert read.column("success").to_pylist() == finished.table()["success"].tolist()
-
-    def test_without_it_everything_else_is_written(self, small, monkeypatch):
-        monkeypatch.setattr(page, "find_spec", lambda _: None)
-        study = small(seeds=1, grid={}).run(jobs=1)
-        write_all(study, "kinarm-study mine.toml")
-        written = {path.name for path in study.store.folder.iterdir()}
-        assert {"runs.csv", "index.html", "beside_bound.png"} <= written
-        assert "runs.parquet" not in written
-
     def test_the_page_fetches_nothing_and_tells_everything(self, folder, finished):
         page = (folder / "index.html").read_text()
         assert not re.search(r"(src|href)=\"(?!#|data:)", re.sub(r"xlink:href", "", page))
@@ -116,7 +101,7 @@ class TestFiles:
         for group in finished.groups():
             for cell in group_row(group):
                 assert cell in page
-        for name in ("learning_curves", "effects", "beside_bound"):
+        for name in ("learning_curves", "effects"):
             assert f'<section id="{name}">' in page
             assert (folder / f"{name}.png").stat().st_size > 5000
             assert (folder / f"{name}.svg").stat().st_size > 5000
@@ -130,11 +115,10 @@ class TestFiles:
 class TestFigures:
     def test_nothing_varies(self, small):
         study = small(grid={}, seeds=1, trials={"count": 5, "per_decade": 0}).run(jobs=1)
-        assert list(draw_all(study)) == ["beside_bound"]
+        assert draw_all(study) == {}
 
     def test_nothing_finished(self, small):
         assert draw_all(small()) == {}
-        assert beside_bound(small()) is None
 
     def test_curves_that_nothing_is_known_of_are_left_out(self, small):
         """Here, the times of one seed."""
