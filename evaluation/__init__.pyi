@@ -6,7 +6,6 @@ from .evaluation import Evaluation as Evaluation
 from .evaluation import evaluate as evaluate
 from .experiments.experiment import Experiment as Experiment
 from .experiments.study import Study as Study
-from .figures import distance_histograms as distance_histograms
 from .figures import save_figure as save_figure
 from .finding import find_contestants as find_contestants
 from .metrics import METRICS as METRICS

@@ -1,7 +1,6 @@
 """Figures of merit of outcomes, and differences of them, with 95 % intervals."""
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from functools import lru_cache
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -128,18 +127,8 @@ def percentile_interval(figures: NDArray[np.float64]) -> Interval:
     return _quantile(ordered, tail), _quantile(ordered, 1 - tail)
 
 
-def resamples(trials: int) -> Iterable[NDArray[np.int64]]:
+def resamples(trials: int) -> Iterator[NDArray[np.int64]]:
     """Trial numbers of all resamples, in pieces of shape (n, trials); seeded."""
-    return _kept(trials) if RESAMPLES * trials <= NUMBERS_AT_ONCE else _drawn(trials)
-
-
-@lru_cache(maxsize=1)
-def _kept(trials: int) -> tuple[NDArray[np.int64], ...]:
-    """A single piece, kept for the next policy with as many trials."""
-    return tuple(_drawn(trials))
-
-
-def _drawn(trials: int) -> Iterator[NDArray[np.int64]]:
     rng, at_once = np.random.default_rng(BOOTSTRAP_SEED), max(1, NUMBERS_AT_ONCE // trials)
     for done in range(0, RESAMPLES, at_once):
         yield rng.integers(trials, size=(min(at_once, RESAMPLES - done), trials))

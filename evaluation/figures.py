@@ -5,7 +5,6 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
 from numpy.typing import NDArray
 
 from kinarm._files import write_atomically
@@ -21,39 +20,6 @@ COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#9
 DASHES = ("solid", "dashed", "dotted", "dashdot")
 
 BIN_WIDTH = 0.05
-
-
-def distance_histograms(evaluations: Sequence[Evaluation]) -> "Figure":
-    """Histograms of the final distance, a panel per problem (paper, Figure 2, right).
-
-    Training seeds share a colour: thin lines are the seeds, the thick one is their mean.
-    """
-    problems = {evaluation.problem.digest: evaluation.problem for evaluation in evaluations}
-    labels = series_labels(evaluations)
-    furthest = max(float(evaluation.rollouts.distance.max()) for evaluation in evaluations)
-    edges = np.arange(0.0, furthest + BIN_WIDTH, BIN_WIDTH)
-    figure, panels = panels_figure((4.2 * len(problems), 3.6), 1, len(problems))
-    for axes, (digest, problem) in zip(panels[0], problems.items(), strict=True):
-        series: dict[str, list[NDArray[np.float64]]] = {label: [] for label in labels}
-        for label, evaluation in zip(labels, evaluations, strict=True):
-            if evaluation.problem.digest == digest:
-                series[label].append(evaluation.rollouts.distance)
-        for number, (label, distances) in enumerate(series.items()):
-            if not distances:
-                continue
-            colour = COLOURS[number % len(COLOURS)]
-            dash = DASHES[number // len(COLOURS) % len(DASHES)]
-            shares = np.array([np.histogram(d, edges)[0] / len(d) for d in distances])
-            for share in shares if len(shares) > 1 else ():
-                axes.stairs(share, edges, color=colour, alpha=0.3, lw=0.8)
-            mean = shares.mean(axis=0)
-            axes.stairs(mean, edges, color=colour, linestyle=dash, lw=2, label=label)
-        axes.axvline(problem.task.tolerance, color="#444444", linestyle=":", linewidth=1)
-        axes.set(title=problem.name, xlabel="final distance to the goal [m]", xlim=(0, None))
-        axes.set_ylim(0, None)
-        axes.legend(frameon=False, fontsize=8)
-    figure.axes[0].set_ylabel(f"share of trials per {BIN_WIDTH} m")
-    return figure
 
 
 def panels_figure(

@@ -1,6 +1,5 @@
 """The figures of merit, in one table."""
 
-import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
@@ -104,22 +103,6 @@ def _middle_half(ordered: NDArray[np.float64]) -> NDArray[np.float64]:
     return ordered[..., n // 4 : n - n // 4]
 
 
-def _median(ordered: NDArray[np.float64]) -> Any:
-    """Median along the last axis of ordered values, which NumPy would sort again."""
-    n = ordered.shape[-1]
-    return (ordered[..., (n - 1) // 2] + ordered[..., n // 2]) / 2
-
-
-def _p95(ordered: NDArray[np.float64]) -> Any:
-    """0.95 quantile of ordered values, interpolated in NumPy's way."""
-    position = 0.95 * (ordered.shape[-1] - 1)
-    low, high = ordered[..., math.floor(position)], ordered[..., math.ceil(position)]
-    beyond = position % 1
-    if beyond < 0.5:
-        return low + (high - low) * beyond
-    return high - (high - low) * (1 - beyond)
-
-
 def _median_or_none(values: NDArray[Any]) -> Any:
     return np.median(values) if values.size else None
 
@@ -157,7 +140,7 @@ METRICS: dict[str, Metric] = {
     "median_distance": _distance(
         meaning=f"median of the {FINAL}",
         definition="median of dᵢ",
-        formula=lambda trials: _median(trials.ordered_distance),
+        formula=lambda trials: np.median(trials.ordered_distance, axis=-1),
         heading="median distance m",
         shows_interval=True,
         priority=10,
@@ -178,7 +161,7 @@ METRICS: dict[str, Metric] = {
     "p95_distance": _distance(
         meaning=f"95th percentile of the {FINAL}",
         definition="0.95 quantile of dᵢ, interpolated linearly",
-        formula=lambda trials: _p95(trials.ordered_distance),
+        formula=lambda trials: np.quantile(trials.ordered_distance, 0.95, axis=-1),
         heading="p95 distance m",
         priority=2,
     ),
@@ -282,7 +265,7 @@ METRICS: dict[str, Metric] = {
     "median_approach": _distance(
         meaning=f"median of the {APPROACH}",
         definition="median of aᵢ",
-        formula=lambda trials: _median(trials.ordered_closest),
+        formula=lambda trials: np.median(trials.ordered_closest, axis=-1),
         needs_holding=True,
         heading="median approach m",
         beside=("p95_approach", "p95 {}"),
@@ -291,7 +274,7 @@ METRICS: dict[str, Metric] = {
     "p95_approach": _distance(
         meaning=f"95th percentile of the {APPROACH}",
         definition="0.95 quantile of aᵢ, interpolated linearly",
-        formula=lambda trials: _p95(trials.ordered_closest),
+        formula=lambda trials: np.quantile(trials.ordered_closest, 0.95, axis=-1),
         needs_holding=True,
     ),
     "held_collision": _share_of(

@@ -17,20 +17,11 @@ if TYPE_CHECKING:
     from kinarm.evaluation.evaluation import Evaluation
     from kinarm.evaluation.selection import Pair
 
-DOCUMENT, HISTOGRAMS, REPORT = "evaluation.json", "final_distance", "index.html"
-"""Files that are written; the histograms as PNG and SVG."""
+DOCUMENT, REPORT = "evaluation.json", "index.html"
+"""Files that are written."""
 
 Tell = Callable[[str], object]
 """Called with what is being done."""
-
-
-def policy_choices() -> tuple[str, ...]:
-    """Names by which a policy can be chosen."""
-    from kinarm.evaluation.contestants import UNTRAINED
-    from kinarm.policies.library import BEST, group_of, policy_names
-
-    names = policy_names()
-    return (BEST, *dict.fromkeys(map(group_of, names)), *names, *UNTRAINED)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -76,7 +67,7 @@ class EvaluationRequest(ProblemOptions, TableOptions):
         Run the trials once more, without ending them at success: how close
         policies come to the goal, and whether they stay there.
     out : Path
-        Folder for evaluation.json and histograms.
+        Folder for evaluation.json.
     report : Path
         Folder for the report: index.html, one page.
     card : Path
@@ -95,20 +86,13 @@ class EvaluationRequest(ProblemOptions, TableOptions):
 
     policies: tuple[str, ...] = field(
         default=(),
-        metadata={
-            "flag": "--policy",
-            "bare": True,
-            "metavar": "NAME_OR_FILE",
-            "completes": policy_choices,
-        },
+        metadata={"flag": "--policy", "bare": True, "metavar": "NAME_OR_FILE"},
     )
     problems: tuple[str, ...] = field(
         default=(),
         metadata={"flag": "--problem", "metavar": "NAME_OR_FILE", "names": problem_names},
     )
-    against: str | None = field(
-        default=None, metadata={"metavar": "NAME_OR_FILE", "completes": policy_choices}
-    )
+    against: str | None = field(default=None, metadata={"metavar": "NAME_OR_FILE"})
     trials: int = field(default=200, metadata=TRIALS)
     seed: int = field(default=0, metadata=FROM_ZERO)
     vec_normalize: Path | None = field(default=None, metadata={"metavar": "FILE|none"})
@@ -230,12 +214,9 @@ class EvaluationRequest(ProblemOptions, TableOptions):
 
             self.write_csv(all_columns(), every_row(document))
         if self.out is not None:
-            from kinarm.evaluation.figures import distance_histograms, save_figure
             from kinarm.evaluation.schemas import document_text
 
             write_text(self.out / DOCUMENT, document_text(document.to_json()))
-            shown = [e for e in evaluations if e.contestant.algorithm != "oracle"] or evaluations
-            save_figure(distance_histograms(shown), self.out, HISTOGRAMS)
 
     def _checked_pairs(self) -> "list[Pair]":
         """Who faces which problem, after checks of policies and files."""
@@ -258,8 +239,7 @@ class EvaluationRequest(ProblemOptions, TableOptions):
             check_card(self.card, pairs, overwrite=self.overwrite)
         written = [self.report / REPORT] if self.report else []
         if self.out is not None:
-            names = (DOCUMENT, f"{HISTOGRAMS}.png", f"{HISTOGRAMS}.svg")
-            written += [self.out / name for name in names]
+            written.append(self.out / DOCUMENT)
         for path in written:
             check_output(path, overwrite=self.overwrite)
         return pairs

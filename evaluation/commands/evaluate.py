@@ -31,7 +31,7 @@ def _report(request: EvaluationRequest, command: str) -> None:
             console.print("no shipped policy was trained for this", style="dim")
     written = [f"{request.csv}"] if request.csv else []
     if request.out is not None:
-        written.append(f"{request.out / DOCUMENT} and histograms")
+        written.append(f"{request.out / DOCUMENT}")
     if request.report is not None:
         written.append(f"{request.report / REPORT}")
     if request.card is not None:

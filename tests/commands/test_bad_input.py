@@ -91,8 +91,6 @@ def test_an_output_folder_that_cannot_be_made_is_refused(run, tmp_path, option):
     ("option", "name"),
     [
         ("--out", "evaluation.json"),
-        ("--out", "final_distance.png"),
-        ("--out", "final_distance.svg"),
         ("--report", "index.html"),
     ],
 )

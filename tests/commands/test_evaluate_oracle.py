@@ -77,14 +77,3 @@ def test_table_tells_how_far_the_proofs_got(run):
     beside, alone = (run("kinarm-eval", *arguments, *more).out for more in ([], ["--no-oracle"]))
     assert f"proofs complete: right {100 * share:.1f} %" in beside
     assert "proofs complete" not in alone
-
-
-def test_histograms_leave_out_the_oracle_unless_it_is_alone(run, policy_folder, tmp_path):
-    for folder, more in (("beside", []), ("alone", ["--no-oracle"])):
-        arguments = ("--policy", policy_folder / "lefty.npz", "--trials", 4, *more)
-        assert run("kinarm-eval", *arguments, "--out", tmp_path / folder).status == 0
-    name = "final_distance.svg"
-    assert (tmp_path / "beside" / name).read_bytes() == (tmp_path / "alone" / name).read_bytes()
-    arguments = ("--policy", "oracle", "--task", "left", "--trials", 4, "--out", tmp_path / "only")
-    assert run("kinarm-eval", *arguments).status == 0
-    assert "oracle" in (tmp_path / "only" / name).read_text()
