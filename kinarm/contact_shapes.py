@@ -65,6 +65,9 @@ class ContactShapes(NamedTuple):
     rounding : ndarray, shape (n_bodies,)
         Radius that widens the hull of the corners [m]; for the scene's bodies,
         it is in their rows.
+    excess : ndarray, shape (n_bodies,)
+        How much less the corners may be widened to lie in the shape [m];
+        infinite if they lie outside.
     extents : ndarray, shape (n_bodies, 2, 3)
         Lower and upper ends of the corners [m].
     planes : ndarray of int, shape (n_pairs, 5)
@@ -89,6 +92,7 @@ class ContactShapes(NamedTuple):
     bodies: NDArray[np.int64]
     corners: Array
     rounding: Array
+    excess: Array
     extents: Array
     planes: NDArray[np.int64]
     proxies: NDArray[np.int64]
@@ -143,7 +147,8 @@ class ContactShapes(NamedTuple):
                 # The fine polytope has all corners of the coarse one.
                 corners = bodies[finer[mover]].corners
                 travel[axis, column] = point_speed(arm.chain, axis, links[mover], corners)
-        capsules = [np.append(*inner_capsule(each)) for each in objects]
+        inner = map(inner_capsule, objects)
+        capsules = [np.append(each.corners, each.rounding) for each in inner]
         capsules += [np.append(AXIS, 0.0 if each.exact else -np.inf) for each in surroundings]
         exact = [isinstance(each.geometry, EXACT) for each in objects]
         exact += [each.exact for each in surroundings]
@@ -155,6 +160,7 @@ class ContactShapes(NamedTuple):
             bodies=np.stack([ends[:-1], ends[1:], np.array(links, dtype=np.int64)], axis=1),
             corners=np.concatenate([body.corners for body in bodies] or [np.zeros((0, 3))]),
             rounding=np.array([body.rounding for body in bodies], dtype=np.float64),
+            excess=np.array([body.excess for body in bodies], dtype=np.float64),
             extents=np.array(
                 [(body.corners.min(axis=0), body.corners.max(axis=0)) for body in bodies]
             ).reshape(-1, 2, 3),
@@ -185,6 +191,8 @@ class UnitBody(NamedTuple):
         What multiplies the corners [m].
     rounding : float
         What widens the polytope then [m].
+    excess : float
+        See `ContactShapes.excess`.
     """
 
     kind: int
@@ -192,6 +200,7 @@ class UnitBody(NamedTuple):
     corners: Array
     size: tuple[float, float, float]
     rounding: float
+    excess: float = 0.0
 
 
 CUBE = np.array(list(product((-1.0, 1.0), repeat=3)))
@@ -206,11 +215,12 @@ def unit_body(body: Body) -> UnitBody:
     if body.shape == "halfspace":
         return UnitBody(WITH_HALFSPACE, True, np.zeros((1, 3)), (0.0, 0.0, 0.0), 0.0)
     if body.shape == "mesh":
-        corners, rounding = around(np.array(body.vertices), MANY)
-        return UnitBody(WITH_BOX, False, corners, (1.0, 1.0, 1.0), rounding)
+        corners, rounding, excess = around(np.array(body.vertices), MANY)
+        return UnitBody(WITH_BOX, False, corners, (1.0, 1.0, 1.0), rounding, excess)
     radius, length = (*body.size, 0.0)[:2]
     if body.shape == "cylinder":
-        return UnitBody(WITH_BOX, False, prism(1.0, 1.0), (radius, radius, length / 2), 0.0)
+        size = (radius, radius, length / 2)
+        return UnitBody(WITH_BOX, False, prism(1.0, 1.0), size, 0.0, np.inf)
     corners = np.array([AXIS[:3], AXIS[3:6]])
     return UnitBody(BETWEEN_CAPSULES, True, corners, (0.0, 0.0, length / 2), radius)
 
@@ -225,7 +235,7 @@ def _enclosed(
 ) -> tuple[list[Enclosure], list[int], list[list[int]]]:
     """Bodies of shapes of arm and scene, their frames, and which bodies are closer, and fine."""
     bodies = [enclosing_polytope(shape, FEW) for shape in objects]
-    bodies += [Enclosure(each.corners, 0.0) for each in surroundings]
+    bodies += [Enclosure(each.corners, 0.0, each.excess) for each in surroundings]
     links = [shape.parentJoint for shape in objects]
     links += range(n_joints + 1, n_joints + 1 + len(surroundings))
     levels = []

@@ -28,15 +28,19 @@ SIDES = 32
 
 
 class Enclosure(NamedTuple):
-    """Hull of corners, shape (n, 3), widened by a radius [m], in a joint's frame."""
+    """Hull of corners, shape (n, 3), widened by a radius [m], in a joint's frame.
+
+    Widened by the excess less, it lies in the shape.
+    """
 
     corners: Array
     rounding: float
+    excess: float = 0.0
 
     def moved(self, placement: pin.SE3) -> "Enclosure":
         """The same one elsewhere."""
         corners = np.array([placement.act(each) for each in self.corners])
-        return Enclosure(corners, self.rounding)
+        return self._replace(corners=corners)
 
 
 def enclosing_polytope(shape: pin.GeometryObject, most: int = MANY) -> Enclosure:
@@ -48,7 +52,7 @@ def enclosing_polytope(shape: pin.GeometryObject, most: int = MANY) -> Enclosure
     corners, radius = core(shape)
     local = Enclosure(corners, radius)
     if isinstance(shape.geometry, coal.Cylinder):
-        local = around(prism(radius, float(corners[1, 2])), most)
+        local = around(prism(radius, float(corners[1, 2])), most)._replace(excess=np.inf)
     elif isinstance(shape.geometry, coal.ConvexBase):
         local = around(corners, most)
     return local.moved(shape.placement)
@@ -78,10 +82,11 @@ def prism(radius: float, half_length: float) -> Array:
 
 
 def around(points: Array, most: int) -> Enclosure:
-    """Enclose the hull of points, shape (n, 3), through the cache."""
+    """Enclose the hull of points, shape (n, 3), of which the corners are, through the cache."""
     made_of = np.int64(most).tobytes() + points.tobytes()
     fitted = cached_arrays("enclosure", ENCLOSURES, made_of, lambda: _fitted(points, most))
-    return Enclosure(fitted["corners"], float(fitted["rounding"]))
+    rounding = float(fitted["rounding"])
+    return Enclosure(fitted["corners"], rounding, excess=rounding)
 
 
 def _fitted(points: Array, most: int) -> dict[str, Any]:

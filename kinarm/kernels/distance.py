@@ -123,16 +123,39 @@ def of_triangle(simplex: Array, i: int, j: int, k: int) -> Vector:
 
 
 @inlined
-def is_beyond(simplex: Array, i: int, j: int, k: int, other: int) -> bool:
-    """Whether a triangle separates the origin from the fourth corner."""
+def normal_of(simplex: Array, i: int, j: int, k: int) -> Vector:
+    """Normal of a triangle of corners, of any length."""
     ab, ac = edge(simplex, i, j), edge(simplex, i, k)
-    normal = (
+    return (
         ab[1] * ac[2] - ab[2] * ac[1],
         ab[2] * ac[0] - ab[0] * ac[2],
         ab[0] * ac[1] - ab[1] * ac[0],
     )
+
+
+@inlined
+def is_beyond(simplex: Array, i: int, j: int, k: int, other: int) -> bool:
+    """Whether a triangle separates the origin from the fourth corner."""
+    normal = normal_of(simplex, i, j, k)
     here = scalar_product(simplex, i, normal)
     return bool(here * (scalar_product(simplex, other, normal) - here) >= 0.0)
+
+
+@helper
+def depth_in(simplex: Array) -> float:
+    """How deep the origin is in a tetrahedron at least; not positive if outside."""
+    least = math.inf
+    for face in range(4):
+        i, j, k = (1 if face < 1 else 0), (2 if face < 2 else 1), (3 if face < 3 else 2)
+        x, y, z = normal_of(simplex, i, j, k)
+        norm = math.sqrt(x * x + y * y + z * z)
+        if norm == 0.0:
+            return 0.0
+        here = scalar_product(simplex, i, (x, y, z)) / norm
+        height = scalar_product(simplex, face, (x, y, z)) / norm - here
+        # No ball about the origin is larger than the height of a corner.
+        least = min(least, min(abs(height), -here if height > 0.0 else here))
+    return least
 
 
 @helper

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from kinarm.contact_shapes import BETWEEN_CAPSULES, WITH_HALFSPACE, ContactShapes
 from kinarm.kernels.compiling import Array, Vector, helper, inlined
-from kinarm.kernels.distance import between_segments, shrink
+from kinarm.kernels.distance import between_segments, depth_in, shrink
 from kinarm.kernels.kinematics import rotated, rotated_back, to_frame, to_world
 from kinarm.kernels.lanes import select
 
@@ -33,6 +33,9 @@ OFFSET, GAP = 3, 4
 
 ALTERNATIONS = 3
 """Projections between box and segment for a first plane."""
+
+DEPTH = 1e-6
+"""Depth beyond which contact is claimed [m]."""
 
 CORNERS_TRIED = 24
 """Corners at which the search ends."""
@@ -188,10 +191,11 @@ def separate(
     relative: Array,
     simplex: Array,
     plane: Array,
-) -> float:
-    """Find a plane that separates a pair well; return the mover's height above it [m].
+) -> tuple[float, bool]:
+    """Find a plane that separates a pair well.
 
-    Takes poses of numbers. The plane, shape (1, PLANE), is replaced by a better one.
+    Returns the mover's height above it [m], and whether they surely touch. Takes poses of numbers.
+    The plane, shape (1, PLANE), is replaced by a better one.
     ``relative``, shape (1, POSE), and ``simplex``, shape (4, 3), are work space.
     """
     carrier, mover = shapes.proxies[pair, FINE, 0], shapes.proxies[pair, FINE, 1]
@@ -217,6 +221,7 @@ def separate(
     if turned:
         nx, ny, nz = rotated_back(poses, base, nx, ny, nz)
     rounding = widened + shapes.rounding[mover]
+    inner = rounding - shapes.excess[carrier] - shapes.excess[mover] - DEPTH
     best, size, norm = -math.inf, 0, math.inf
     for _ in range(CORNERS_TRIED):
         # The mover's lowest corner, and the carrier's highest.
@@ -236,7 +241,7 @@ def separate(
             plane[0, 0], plane[0, 1], plane[0, 2] = nx, ny, nz
             plane[0, OFFSET] = above + widened
         missing = norm - max(best, 0.0)
-        if missing <= CLOSE or missing <= COARSE * (best - rounding) or norm <= rounding:
+        if missing <= CLOSE or missing <= COARSE * (best - rounding) or norm <= inner:
             break
         simplex[size, 0], simplex[size, 1], simplex[size, 2] = wx, wy, wz
         size, x, y, z = shrink(simplex, size + 1)
@@ -249,4 +254,6 @@ def separate(
         plane[0, OFFSET] += x * poses[base, 13] + y * poses[base, 14] + z * poses[base, 15]
         plane[0, 0], plane[0, 1], plane[0, 2] = x, y, z
     plane[0, GAP] = best - rounding
-    return best - rounding
+    if norm < CLOSE and size == 4:
+        norm = -depth_in(simplex)
+    return best - rounding, norm <= inner

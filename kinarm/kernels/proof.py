@@ -11,11 +11,10 @@ nothing, a better plane is taken, and then each configuration or interval betwee
 from kinarm.chain import Chain
 from kinarm.contact_shapes import PLANE, WITH_HALFSPACE, ContactShapes
 from kinarm.kernels.compiling import Array, helper, inlined
-from kinarm.kernels.kinematics import forward_kinematics
 from kinarm.kernels.lanes import any_lane, as_numbers, lane_bits, select
 from kinarm.kernels.overlap import DEPTH, overlap
 from kinarm.kernels.planes import EVERYDAY, FINE, GAP, height_above, propose, separate
-from kinarm.kernels.session import Alone, Block, put, take, take_rows
+from kinarm.kernels.session import Alone, Block, place_between, put, take, take_rows
 
 MARGIN = 2e-6
 """Distance beyond which freedom is claimed [m].
@@ -171,7 +170,10 @@ def prove_alone(
                 place_between(0, 1, lane, chain, shapes, block, alone, alone.before)
                 at_start = True
             take(block.planes, pair, lane, plane, 0)
-            last = separate(shapes, pair, alone.after, alone.relative, alone.simplex, plane)
+            work = alone.relative, alone.simplex, plane
+            last, touching = separate(shapes, pair, alone.after, *work)
+            if tested == 0 and touching:
+                return -1 - pair
             first = height_above(shapes, pair, FINE, alone.before, plane, 0)
             unproven = open_parts(first, last, bend, tested)
             heights[pair, lane] = first
@@ -224,81 +226,61 @@ def is_part_free(
         pair = alone.listed[index, 0]
         if alone.listed[index, 1] & bit != 0:
             bend = bends[pair, lane] / (parts * parts) if tested == 0 else -1.0
-            if not is_proven_apart(pair, lane, bend, shapes, block, alone):
+            if verdict_of(pair, lane, bend, shapes, block, alone) < 1:
                 return False
     return True
 
 
 @inlined
-def is_proven_apart(
+def verdict_of(
     pair: int, lane: int, bend: float, shapes: ContactShapes, block: Block, alone: Alone
-) -> bool:
-    """Whether its or a better plane proves a pair apart at ``alone.before``.
+) -> int:
+    """1 if its or a better plane proves a pair apart at ``alone.before``, -1 if it touches, else 0.
 
-    Unless the bend is negative, also on the way from ``alone.after``, which bends so far.
+    Unless the bend is negative, it is apart also on the way from ``alone.after``, which bends so
+    far.
     """
+    touching = False
     take(block.planes, pair, lane, alone.plane, 0)
     height = height_above(shapes, pair, FINE, alone.before, alone.plane, 0)
+    if shapes.pairs[pair, 0] == WITH_HALFSPACE:
+        touching = height + shapes.excess[shapes.proxies[pair, FINE, 1]] < -DEPTH
     if bend >= 0.0:
         height = min(height, height_above(shapes, pair, FINE, alone.after, alone.plane, 0))
         height -= 0.125 * bend
     if not is_apart(height) and shapes.pairs[pair, 0] != WITH_HALFSPACE:
-        height = separate(shapes, pair, alone.before, alone.relative, alone.simplex, alone.plane)
+        work = alone.relative, alone.simplex, alone.plane
+        height, touching = separate(shapes, pair, alone.before, *work)
         if bend >= 0.0:
             height = min(height, height_above(shapes, pair, FINE, alone.after, alone.plane, 0))
             height -= 0.125 * bend
-    return height > (SURE_FREEDOM if bend >= 0.0 else MARGIN)
-
-
-@inlined
-def place_between(
-    k: int,
-    parts: int,
-    lane: int,
-    chain: Chain,
-    shapes: ContactShapes,
-    block: Block,
-    alone: Alone,
-    poses: Array,
-) -> None:
-    """Fill in an episode's poses at configuration k of its step, where so many parts are over."""
-    q, target = as_numbers(block.q), as_numbers(block.target)
-    for joint in range(block.q.shape[1]):
-        start, end = q[0, joint, lane], target[0, joint, lane]
-        alone.q[0, joint] = end if k == parts else start + k / parts * (end - start)
-    forward_kinematics(chain, alone.q, 0, poses)
-    for moving in range(shapes.moving.shape[0]):
-        frame = poses.shape[0] - shapes.placed.shape[0] + shapes.moving[moving]
-        for i in range(3):
-            start, end = alone.moved[moving, i], alone.moved[moving, 3 + i]
-            poses[frame, 13 + i] = end if k == parts else start + k / parts * (end - start)
+    apart = height > (SURE_FREEDOM if bend >= 0.0 else MARGIN)
+    return 1 if apart else -1 if touching else 0
 
 
 @helper
 def prove_configuration(
     lane: int, shapes: ContactShapes, poses: Array, block: Block, alone: Alone
-) -> bool:
-    """Prove an episode's configuration free as far as first planes have not."""
-    plane, planes = alone.plane, as_numbers(block.planes)
-    take_rows(poses, lane, alone.after)
+) -> int:
+    """1 if an episode's configuration is proven free, -1 if it touches something, else 0."""
+    found, plane, planes = 1, alone.plane, as_numbers(block.planes)
+    take_rows(poses, lane, alone.before)
     for pair in range(shapes.planes.shape[0]):
         if is_apart(planes[pair, GAP, lane]):
             continue
-        if shapes.pairs[pair, 0] == WITH_HALFSPACE:
-            return False
-        take(block.planes, pair, lane, plane, 0)
-        height = separate(shapes, pair, alone.after, alone.relative, alone.simplex, plane)
+        verdict = verdict_of(pair, lane, -1.0, shapes, block, alone)
         put(plane, 0, block.planes, pair, lane)
-        if not is_apart(height):
-            return False
-    return True
+        if verdict < 0:
+            return verdict
+        found = min(found, verdict)
+    return found
 
 
 @inlined
 def prove_configurations(
     shapes: ContactShapes, touched: int, filled: int, block: Block, alone: Alone
-) -> int:
-    """Bits of the arms that are proven free; ``touched`` are those that are not.
+) -> tuple[int, int]:
+    """Bits of the arms that are proven free, and of those that touch, more than those ``touched``.
 
     Takes the poses ``after``, and gives all pairs a first plane.
     """
@@ -310,10 +292,11 @@ def prove_configurations(
         least = min(least, height)
     free = lane_bits(is_apart(least))
     for lane in range(filled):
-        open_here = (free | touched) >> lane & 1 == 0
-        if open_here and prove_configuration(lane, shapes, block.after, block, alone):
-            free |= 1 << lane
-    return free
+        if (free | touched) >> lane & 1 == 0:
+            verdict = prove_configuration(lane, shapes, block.after, block, alone)
+            free |= 1 << lane if verdict > 0 else 0
+            touched |= 1 << lane if verdict < 0 else 0
+    return free, touched
 
 
 @helper
@@ -342,6 +325,9 @@ def first_contact(
     for pair in range(shapes.pairs.shape[0]):
         if overlap(shapes, pair, alone.before) > enough:
             return pair + 1
-        if tested > 0 and not is_proven_apart(pair, lane, -1.0, shapes, block, alone):
+        verdict = verdict_of(pair, lane, -1.0, shapes, block, alone)
+        if verdict < 0:
+            return pair + 1
+        if tested > 0 and verdict == 0:
             return 0
     return 0

@@ -60,7 +60,7 @@ def begin(counters: NDArray[np.int64], session: Session, rows: NDArray[np.int64]
                 step = episodes.steps[e]
                 move_bodies(e, step, lane, shapes, rules, episodes.scenes, block.after)
         forward_kinematics(chain, block.q, 0, block.after)
-        free = prove_configurations(shapes, 0, filled, block, alone)
+        free, _ = prove_configurations(shapes, 0, filled, block, alone)
         arm = block.after[: q.shape[1] + 1]
         block.distance[0] = observe(chain.tool, arm, block.goal, 0, block.observation)
         # Store all that an episode begins with.

@@ -57,7 +57,7 @@ def screen(
             put_scene(scenes, row, lane, block.after)
         forward_kinematics(chain, block.q, 0, block.after)
         touched = lane_bits(deepest_overlap(shapes, block.after) > DEPTH)
-        apart = prove_configurations(shapes, touched, filled, block, alone)
+        apart, touched = prove_configurations(shapes, touched, filled, block, alone)
         x, y, z = to_world(block.after, n_joints, tool[0], tool[1], tool[2])
         block.goal[0, 0], block.goal[0, 1], block.goal[0, 2] = x, y, z
         for lane in range(filled):

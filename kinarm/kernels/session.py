@@ -11,7 +11,7 @@ from kinarm.chain import Chain
 from kinarm.contact_shapes import PLANE, ContactShapes
 from kinarm.episodes import Control, Episodes, Rules
 from kinarm.kernels.compiling import Array, inlined, lean_kernel
-from kinarm.kernels.kinematics import POSE, place_bodies
+from kinarm.kernels.kinematics import POSE, forward_kinematics, place_bodies
 from kinarm.kernels.lanes import LANES, as_numbers, instruction, lanes
 from kinarm.kernels.records import Fixed, Layout, Record, Shapes, table
 
@@ -156,6 +156,30 @@ def move_bodies(
         body = shapes.moving[k]
         for i in range(3):
             numbers[first + body, 13 + i, lane] = scenes[e, body, 13 + i] + rules.moves[step, k, i]
+
+
+@inlined
+def place_between(
+    k: int,
+    parts: int,
+    lane: int,
+    chain: Chain,
+    shapes: ContactShapes,
+    block: Block,
+    alone: Alone,
+    poses: Array,
+) -> None:
+    """Fill in an episode's poses at configuration k of its step, where so many parts are over."""
+    q, target = as_numbers(block.q), as_numbers(block.target)
+    for joint in range(block.q.shape[1]):
+        start, end = q[0, joint, lane], target[0, joint, lane]
+        alone.q[0, joint] = end if k == parts else start + k / parts * (end - start)
+    forward_kinematics(chain, alone.q, 0, poses)
+    for moving in range(shapes.moving.shape[0]):
+        frame = poses.shape[0] - shapes.placed.shape[0] + shapes.moving[moving]
+        for i in range(3):
+            start, end = alone.moved[moving, i], alone.moved[moving, 3 + i]
+            poses[frame, 13 + i] = end if k == parts else start + k / parts * (end - start)
 
 
 @inlined

@@ -116,7 +116,7 @@ def test_other_shapes_are_refused(enclosing):
 )
 def test_the_capsule_in_a_shape(geometry, share, directions):
     """It reaches no farther than the shape in any direction, and fills a fair share of it."""
-    (start, end), radius = inner_capsule(placed(geometry))
+    (start, end), radius, _ = inner_capsule(placed(geometry))
     capsule = np.pi * radius**2 * (np.linalg.norm(end - start) + 4 / 3 * radius)
     if isinstance(geometry, coal.ConvexBase):
         points = np.array([PLACED.act(point) for point in geometry.points()])

@@ -6,10 +6,15 @@ import numpy as np
 import pytest
 from numba import njit
 
-from kinarm.kernels.distance import between_segments, closest_to_box
+from kinarm.kernels.distance import between_segments, closest_to_box, depth_in
 
 ORIGIN = (0.0, 0.0, 0.0)
 UNIT = (1.0, 1.0, 1.0)
+
+
+@njit
+def depth(simplex):
+    return depth_in(simplex)
 
 
 @njit
@@ -161,3 +166,19 @@ class TestClosestToBox:
             b[n // 2 :] = a[n // 2 :]
         gaps, distances = box_gaps(a, b, low, high), box_distances(a, b, low, high)
         assert np.abs(distances - gaps).max() < 1e-6
+
+
+@pytest.mark.parametrize(
+    ("corners", "exact"),
+    [
+        ([(1, 1, 1), (1, -1, -1), (-1, 1, -1), (-1, -1, 1)], 3**-0.5),
+        ([(0, 0, 3), (1, 0, -0.1), (-1, 1, -0.1), (-1, -1, -0.1)], 0.1),
+        ([(0, 0, 3), (1, 0, 0.1), (-1, 1, 0.1), (-1, -1, 0.1)], -0.1),
+        ([(1, 0, 1e-9), (-1, 1, 0), (-1, -1, 0), (2, 0, -1e-9)], 0.0),
+        ([(1, 0, 0), (1, 0, 0), (-1, -1, 0), (2, 0, -1)], 0.0),
+    ],
+)
+def test_how_deep_the_origin_is_in_a_tetrahedron(corners, exact):
+    for order in ([0, 1, 2, 3], [2, 0, 3, 1]):
+        found = depth(np.array(corners, dtype=float)[order])
+        assert found == pytest.approx(exact, abs=1e-8) if exact >= 0 else found < 0

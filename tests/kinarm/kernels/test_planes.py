@@ -10,8 +10,11 @@ from kinarm.kernels.planes import EVERYDAY, FINE, height_above, propose, separat
 
 
 @njit
-def heights(chain, shapes, configurations, proposed, separated, again, coarse):
-    """Heights above planes as proposed; as bettered, told and anew; and so with coarse movers."""
+def heights(chain, shapes, configurations, proposed, separated, again, coarse, touching):
+    """Heights above planes as proposed; as bettered, told and anew; and so with coarse movers.
+
+    And 1 where bodies are said to touch.
+    """
     poses = np.empty((configurations.shape[1] + 1 + len(shapes.placed), POSE))
     place_bodies(shapes.placed, poses)
     plane, relative, simplex = np.empty((1, PLANE)), np.empty((1, POSE)), np.empty((4, 3))
@@ -22,7 +25,8 @@ def heights(chain, shapes, configurations, proposed, separated, again, coarse):
             proposed[i, pair] = height_above(shapes, pair, EVERYDAY, poses, plane, 0)
             separated[i, pair] = height_above(shapes, pair, FINE, poses, plane, 0)
             if shapes.pairs[pair, 0] != WITH_HALFSPACE:
-                separated[i, pair] = separate(shapes, pair, poses, relative, simplex, plane)
+                found = separate(shapes, pair, poses, relative, simplex, plane)
+                separated[i, pair], touching[i, pair] = found
             again[i, pair] = height_above(shapes, pair, FINE, poses, plane, 0)
             coarse[i, pair] = height_above(shapes, pair, EVERYDAY, poses, plane, 0)
 
@@ -30,11 +34,15 @@ def heights(chain, shapes, configurations, proposed, separated, again, coarse):
 def test_heights_are_no_more_than_the_distance_and_bettered_planes_tight(any_simulator):
     configurations = random_configurations(any_simulator, 21, 500)
     shapes = any_simulator.world.contact_model.shapes
-    found = np.empty((4, len(configurations), len(shapes.planes)))
+    found = np.zeros((5, len(configurations), len(shapes.planes)))
     heights(any_simulator.arm.chain, shapes, configurations, *found)
     exact = pair_distances(any_simulator.world, configurations)
-    assert (found <= np.fmax(exact, 0) + 1e-6).all()
-    proposed, separated, again, coarse = found
+    proposed, separated, again, coarse, touching = found
+    assert (found[:4] <= np.fmax(exact, 0) + 1e-6).all()
+    assert (exact[touching > 0] < -9e-7).all()
+    known = np.isfinite(shapes.excess[shapes.proxies[:, FINE]]).all(axis=1)
+    deep = (exact < -3e-4) & known & (shapes.pairs[:, 0] != WITH_HALFSPACE)
+    assert touching[deep].mean() > 0.99
     np.testing.assert_allclose(separated, again, rtol=0, atol=1e-12)
     apart = exact > 1e-3
     missing = (exact - separated)[apart]
