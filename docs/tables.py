@@ -71,7 +71,7 @@ def capsule_table(name: str) -> str:
     """Collision shapes of an arm."""
     rows = []
     for shape in Arm.load(name).geometry.geometryObjects:
-        (start, end), radius = inner_capsule(shape)
+        (start, end), radius, _ = inner_capsule(shape)
         frame = f"joint {shape.parentJoint}" if shape.parentJoint else "world"
         link = link_of(shape).replace("_", " ")
         rows.append([link, frame, numbers(start), numbers(end), f"{radius:.3f}"])
