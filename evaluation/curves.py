@@ -1,8 +1,10 @@
 """Learning curves over training seeds, from files of kinarm and Stable-Baselines3."""
 
 import csv
+import json
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from glob import glob
+from operator import itemgetter
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal, NamedTuple, get_args
 
@@ -18,6 +20,9 @@ from kinarm.policies.library import group_of
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+
+WINDOW = 100
+"""Episodes in the moving average of monitor files, but a tenth of all at most."""
 
 Measure = Literal["success", "return"]
 Points = NDArray[np.float64]
@@ -78,8 +83,8 @@ class LearningCurves(NamedTuple):
         Parameters
         ----------
         sources : iterable of str or Path
-            Groups of seeds: files ``NAME-seed0.curve.csv`` or
-            ``evaluations.npz``, a pattern such as ``"logs/*/evaluations.npz"``,
+            Groups of seeds: files ``NAME-seed0.curve.csv``, ``evaluations.npz``
+            or ``monitor.csv``, a pattern such as ``"logs/*/evaluations.npz"``,
             or a folder with such files; perhaps with ``"LABEL="`` in front.
         measure : {"success", "return"}, optional
             What to show; by default success, if all files tell it.
@@ -92,8 +97,8 @@ class LearningCurves(NamedTuple):
         groups: dict[str, list[dict[str, Points]]] = {}
         for source in map(str, sources):
             label, _, name = ("", "", source) if Path(source).exists() else source.rpartition("=")
-            for own, file in _trainings(name):
-                groups.setdefault(label or own, []).append(_read(file))
+            for own, files in _trainings(name):
+                groups.setdefault(label or own, []).append(_read(files))
         each = [training for group in groups.values() for training in group]
         told = [name for name in get_args(Measure) if all(name in known for known in each)]
         if (shown := measure or told[0]) not in told:
@@ -121,49 +126,73 @@ class LearningCurves(NamedTuple):
         return figure
 
 
-def _trainings(name: str) -> list[tuple[str, Path]]:
-    """Label and file of each training behind a file, folder or pattern."""
+def _trainings(name: str) -> list[tuple[str, list[Path]]]:
+    """Label and files of each training behind a file, folder or pattern."""
     found = sorted(glob(name, recursive=True))  # noqa: PTH207 (it takes absolute patterns)
-    trainings = []
-    for path in map(Path, [name] if Path(name).exists() else found):
+    paths = [name] if Path(name).exists() else found
+    trainings: dict[Path, tuple[str, list[Path]]] = {}
+    for path in map(Path, paths):
         kinds = (sorted(path.rglob(kind)) for kind in READERS)
         for file in next(filter(None, kinds), []) if path.is_dir() else [path]:
             recipe = file.parent / group_of(file.name.removesuffix(".curve.csv"))
-            trainings.append((str(recipe) if file.match(OWN) else name.rstrip("/"), file))
+            label = str(recipe) if file.match(OWN) else name.rstrip("/")
+            whole = file.parent if file.match(MONITOR) else file
+            trainings.setdefault(whole, (label, []))[1].append(file)
     if not trainings:
         raise InvalidInputError(f"there is no learning curve {name!r}: {', '.join(READERS)}")
-    return trainings
+    return list(trainings.values())
 
 
-def _read(file: Path) -> dict[str, Points]:
+def _read(files: Sequence[Path]) -> dict[str, Points]:
     """Steps, returns and perhaps successes of a training, shape (n_points,)."""
-    name, kinds = repr(str(file)), [kind for kind in READERS if file.match(kind)]
+    name, kinds = repr(str(files[0])), [kind for kind in READERS if files[0].match(kind)]
     if not kinds:
         raise InvalidInputError(f"{name} is no learning curve: {', '.join(READERS)}")
     with reading(name, "learning curve", InvalidInputError, of="file with a"):
-        told = READERS[kinds[0]](file)
+        told = READERS[kinds[0]](files)
         if not (known := np.isfinite(told["return"])).any():
             raise ValueError("it holds no point")
         return {each: values[known] for each, values in told.items()}
 
 
-def _read_own(file: Path) -> dict[str, Points]:
-    rows = list(csv.DictReader(file.read_text(encoding="utf-8").splitlines()))
+def _read_own(files: Sequence[Path]) -> dict[str, Points]:
+    rows = list(csv.DictReader(files[0].read_text(encoding="utf-8").splitlines()))
     names = {"steps": "environment_steps", "success": "success", "return": "mean_return"}
     return {each: np.array([float(row[name]) for row in rows]) for each, name in names.items()}
 
 
-def _read_evaluations(file: Path) -> dict[str, Points]:
+def _read_evaluations(files: Sequence[Path]) -> dict[str, Points]:
     """Means over the episodes of each evaluation."""
-    with np.load(file, allow_pickle=False) as content:
+    with np.load(files[0], allow_pickle=False) as content:
         names = {"steps": "timesteps", "success": "successes", "return": "results"}
         told = {each: content[name] for each, name in names.items() if name in content}
     return {each: values.reshape(len(values), -1).mean(axis=1) for each, values in told.items()}
 
 
-OWN = "*.curve.csv"
-READERS: dict[str, Callable[[Path], dict[str, Points]]] = {
+def _read_monitors(files: Sequence[Path]) -> dict[str, Points]:
+    """Moving averages over the episodes of all environments, in the order of their ends."""
+    episodes: list[tuple[float, dict[str, str]]] = []
+    for file in files:
+        header, *lines = file.read_text(encoding="utf-8").splitlines()
+        start = float(json.loads(header.removeprefix("#"))["t_start"])
+        episodes += [(start + float(row["t"]), row) for row in csv.DictReader(lines)]
+    rows = [row for _, row in sorted(episodes, key=itemgetter(0))]
+    told = {"return": [float(row["r"]) for row in rows]}
+    if all("is_success" in row for row in rows):
+        told["success"] = [float(row["is_success"] in ("True", "1", "1.0")) for row in rows]
+    window = min(WINDOW, -(-len(rows) // 10))
+    steps = np.cumsum([float(row["l"]) for row in rows])[window - 1 :]
+    share = np.full(window, 1 / window)
+    return {
+        "steps": steps,
+        **{name: np.convolve(each, share, "valid") for name, each in told.items()},
+    }
+
+
+OWN, MONITOR = "*.curve.csv", "*monitor.csv"
+READERS: dict[str, Callable[[Sequence[Path]], dict[str, Points]]] = {
     "evaluations.npz": _read_evaluations,
     OWN: _read_own,
+    MONITOR: _read_monitors,
 }
 """Names of files, and what reads them; a folder gives those of the first kind that it has."""

@@ -1,6 +1,5 @@
 """An evaluation, from the request to the files."""
 
-import json
 from collections.abc import Callable
 from contextlib import ExitStack
 from dataclasses import dataclass, field
@@ -215,7 +214,9 @@ class EvaluationRequest(ProblemOptions, TableOptions):
 
             self.write_csv(all_columns(), every_row(document))
         if self.out is not None:
-            write_text(self.out / DOCUMENT, json.dumps(document.to_json()) + "\n")
+            from kinarm.evaluation.schemas import document_text
+
+            write_text(self.out / DOCUMENT, document_text(document.to_json()))
 
     def _checked_pairs(self) -> "list[Pair]":
         """Who faces which problem, after checks of policies and files."""

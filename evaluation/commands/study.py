@@ -187,8 +187,8 @@ class CurvesRequest(Checked):
     Parameters
     ----------
     sources : tuple of str
-        Groups of seeds: NAME.curve.csv of kinarm, evaluations.npz of
-        Stable-Baselines3, folders of these, or quoted patterns.
+        Groups of seeds: NAME.curve.csv of kinarm, evaluations.npz or
+        monitor.csv of Stable-Baselines3, folders of these, or quoted patterns.
     measure : {"success", "return"}
         What they show.
     out : Path

@@ -1,5 +1,8 @@
 """Learning curves are those of the files, and their intervals those of SciPy."""
 
+import csv
+import json
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -22,6 +25,15 @@ def own(path, steps, success):
 def evaluations(path, steps, **results):
     path.parent.mkdir(exist_ok=True, parents=True)
     np.savez(path, timesteps=np.array(steps), **results)
+
+
+def monitor(path, start, episodes):
+    """A file of Stable-Baselines3's ``Monitor``, of returns, lengths and ends."""
+    path.parent.mkdir(exist_ok=True, parents=True)
+    with path.open("w") as file:
+        file.write(f"#{json.dumps({'t_start': start, 'env_id': 'kinarm'})}\n")
+        writer = csv.writer(file)
+        writer.writerows([("r", "l", "t", "is_success"), *episodes])
 
 
 class TestBand:
@@ -79,11 +91,32 @@ class TestFiles:
             results, ends = np.full((2, 4), float(seed)), np.array([[False] * 4, [True] * 4])
             path = tmp_path / f"logs{seed}" / "evaluations.npz"
             evaluations(path, [100, 200], results=results, successes=ends)
+            monitor(path.with_name("monitor.csv"), 0, [(9.0, 3, 1.0, False)])
         pattern = f"{tmp_path}/logs*"
         (band,) = LearningCurves.load([pattern]).bands.values()
         assert (band.seeds, band.mean.tolist()) == (3, [0.0, 1.0])
         (band,) = LearningCurves.load([pattern], "return").bands.values()
         assert band.mean.tolist() == [1.0, 1.0]
+
+    def test_monitors_of_a_folder_are_one_training_in_the_order_of_time(self, tmp_path):
+        pytest.importorskip("stable_baselines3")
+        from stable_baselines3.common.monitor import load_results
+        from stable_baselines3.common.results_plotter import ts2xy
+
+        rng = np.random.default_rng(0)
+        for env in range(2):
+            times = np.sort(rng.uniform(0, 100, 700))
+            episodes = zip(rng.normal(size=700), rng.integers(1, 64, 700), times, strict=True)
+            path = tmp_path / f"{env}.monitor.csv"
+            monitor(path, 1000.0 + env, [(*each, each[0] > 0) for each in episodes])
+        steps, returns = ts2xy(load_results(str(tmp_path)), "timesteps")
+        (band,) = LearningCurves.load([tmp_path], "return").bands.values()
+        assert band.seeds == 1
+        np.testing.assert_array_equal(band.places, steps[99:])
+        windows = np.lib.stride_tricks.sliding_window_view(returns, 100).mean(axis=1)
+        np.testing.assert_allclose(band.mean, windows, atol=1e-12)
+        (band,) = LearningCurves.load([tmp_path]).bands.values()
+        assert band.mean[0] == pytest.approx(np.mean(returns[:100] > 0))
 
     def test_what_not_all_tell_is_refused(self, tmp_path):
         own(tmp_path / "mine.curve.csv", [10, 20], [0.5, 0.6])
@@ -103,6 +136,8 @@ class TestFiles:
                 b"environment_steps,success,mean_return\n9,nan,nan\n",
                 "it holds no point",
             ),
+            ("monitor.csv", b"", "is not a complete file with a"),
+            ("monitor.csv", b'#{"t_start": 0}\nr,l,t\n', "is not a complete file with a"),
             ("evaluations.npz", b"PK", "is not a complete file with a"),
             ("curves.csv", b"a", "is no learning curve"),
         ],
