@@ -11,6 +11,7 @@ from .finding import find_contestants as find_contestants
 from .metrics import METRICS as METRICS
 from .metrics import Metric as Metric
 from .outcomes import Outcomes as Outcomes
+from .replay.choosing import find_failures as find_failures
 from .replay.request import ReplayRequest as ReplayRequest
 from .replay.runs import record as record
 from .report.card import policy_card as policy_card

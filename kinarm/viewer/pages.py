@@ -15,6 +15,7 @@ import coal
 import numpy as np
 from jinja2 import Environment, FunctionLoader, StrictUndefined
 from markupsafe import Markup
+from numpy.typing import ArrayLike
 
 from kinarm._files import write_text
 from kinarm.arm import Arm
@@ -23,7 +24,8 @@ from kinarm.body_motion import BodyMotion
 from kinarm.collision import ContactModel
 from kinarm.enclosures import core
 from kinarm.errors import InvalidInputError
-from kinarm.recording import Recording
+from kinarm.problem import ProblemLike
+from kinarm.recording import Recording, record_path
 from kinarm.scene import Scene
 from kinarm.viewer.camera import stage_scale
 from kinarm.viewer.drawing import (
@@ -37,6 +39,7 @@ from kinarm.viewer.drawing import (
 )
 from kinarm.viewer.parts import OUTCOME_COLOURS, TRACE_SIDES
 from kinarm.viewer.visual_shapes import arm_parts, collision_parts, link_joints
+from kinarm.world import World
 
 NOTEBOOK_HEIGHT = 560
 """Height of a page in a notebook [pixels]."""
@@ -210,6 +213,26 @@ def replay_page(
     if path is not None:
         page.save(path)
     return page
+
+
+def replay_path(
+    problem: ProblemLike | World,
+    path: ArrayLike,
+    file: str | Path | None = None,
+    *,
+    goal: ArrayLike | None = None,
+    name: str = "path",
+) -> ReplayPage:
+    """Make a page that plays your own path up to its contact, if any.
+
+    Parameters
+    ----------
+    problem, path, goal, name
+        As for `kinarm.record_path`.
+    file : str or Path, optional
+        Where to write the page, if at all.
+    """
+    return replay_page(record_path(problem, path, goal=goal, name=name), file)
 
 
 def _check_recordings(recordings: Sequence[Recording], ghosts: Sequence[Recording]) -> None:

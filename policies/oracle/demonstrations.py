@@ -1,7 +1,11 @@
 """Demonstrations: motions of the oracle that reach their goals, to learn from."""
 
+import shutil
+import warnings
+from collections.abc import Iterator
 from dataclasses import dataclass, fields
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -9,6 +13,8 @@ from numpy.typing import NDArray
 from kinarm._files import load_archive, reading, save_archive
 from kinarm.errors import (
     InvalidInputError,
+    MissingExtraError,
+    OutputError,
     RecordingFileError,
     finite_array,
     whole_number,
@@ -154,6 +160,78 @@ class Demonstrations:
         with reading(repr(str(path)), KIND, RecordingFileError):
             problem = ReachProblem.from_json(archive.header["problem"])
             return cls(problem=problem, trials=archive.header["trials"], **archive.arrays)
+
+    def to_minari(self, dataset_id: str, **about: Any) -> Any:
+        """Write a data set of Minari (extra ``minari``).
+
+        Its ``recover_environment()`` makes the environment, of any problem. The
+        metadata of an episode hold the ``options`` of its reset.
+
+        Parameters
+        ----------
+        dataset_id : str
+            Such as ``"kinarm/right-oracle-v0"``.
+        **about
+            What ``minari.create_dataset_from_buffers`` takes: ``author``,
+            ``description``.
+
+        Returns
+        -------
+        minari.MinariDataset
+
+        Raises
+        ------
+        InvalidInputError
+            If the name is not of that form.
+        OutputError
+            If there is such a data set, or it cannot be written.
+        """
+        try:
+            import minari
+            from minari.dataset.minari_dataset import parse_dataset_id
+            from minari.storage import get_dataset_path
+        except ImportError as error:
+            raise MissingExtraError("minari", "minari") from error
+        from gymnasium import make
+
+        try:
+            parse_dataset_id(dataset_id)
+        except (TypeError, ValueError) as error:
+            raise InvalidInputError(
+                f"dataset_id must be like 'kinarm/right-oracle-v0', got {dataset_id!r}"
+            ) from error
+        folder = get_dataset_path(dataset_id)
+        if folder.exists():
+            raise OutputError(
+                f"data set {dataset_id!r} exists: minari.delete_dataset({dataset_id!r}) removes it"
+            )
+        env = make("kinarm.envs:kinarm/Reach-v0", problem=self.problem)
+        said = {"algorithm_name": "oracle", "description": repr(self), "requirements": ["kinarm"]}
+        given = {"env": env, **said, **about}
+        try:
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore", UserWarning)  # about what is not said of it
+                return minari.create_dataset_from_buffers(dataset_id, [*self._buffers()], **given)
+        except OSError as error:
+            shutil.rmtree(folder, ignore_errors=True)
+            raise OutputError(f"cannot write {str(folder)!r}: {error.strerror}") from error
+
+    def _buffers(self) -> Iterator[Any]:
+        """The motions as Minari takes them."""
+        from minari.data_collector import EpisodeBuffer
+
+        ends = np.flatnonzero(self.terminations) + 1
+        for number, (end, steps) in enumerate(zip(ends, self.steps, strict=True)):
+            part = slice(end - steps, end)
+            final = self.final_observations[number, None]
+            yield EpisodeBuffer(
+                options={"start": self.starts[number], "goal": self.goals[number]},
+                observations=np.concatenate([self.observations[part], final]),
+                actions=self.actions[part],
+                rewards=self.rewards[part],
+                terminations=self.terminations[part],
+                truncations=self.truncations[part],
+            )
 
 
 ARRAYS = [item.name for item in fields(Demonstrations)][2:]

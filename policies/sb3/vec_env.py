@@ -4,7 +4,7 @@ import time
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 from stable_baselines3.common.monitor import Monitor
 from stable_baselines3.common.vec_env.base_vec_env import VecEnv, VecEnvIndices, VecEnvStepReturn
 
@@ -70,11 +70,34 @@ class SB3VecEnv(Lifecycle, VecEnv):
         self._share = replay_share
         self._size = whole_number("replay_size", replay_size, 1, LARGEST_REPLAY)
         self._chooser = np.random.default_rng()
-        self._failed = FailedScenarios.none(simulator.arm.n_joints)
+        self._failed = self._restored = FailedScenarios.none(simulator.arm.n_joints)
         self._starts = np.empty((num_envs, simulator.arm.n_joints))
         self._replayed = np.zeros(num_envs, dtype=bool)
         self._returns = np.zeros(num_envs)
         self._made = time.time()
+
+    @property
+    def failed(self) -> FailedScenarios:
+        """Scenarios of the last failed episodes, for replay."""
+        return self._failed
+
+    def restore_failed(self, starts: ArrayLike, goals: ArrayLike) -> None:
+        """Replay the `failed` scenarios of an earlier environment instead.
+
+        A reset with a seed goes back to them: the same seed gives the same
+        episodes.
+
+        Parameters
+        ----------
+        starts, goals : array_like, shape (n, n_joints) and (n, 3)
+            Configurations [rad or m] and positions [m], oldest first; the last
+            ``replay_size`` are kept.
+        """
+        if not self._share:
+            raise InvalidInputError("failed scenarios need an environment with a replay_share")
+        checked, size = self.simulator.reset(starts, goals), self._size
+        self._failed = FailedScenarios(checked.q[-size:], checked.goal[-size:])
+        self._restored = self._failed
 
     def reset(self) -> Observations:
         """Begin all episodes anew, with the seeds and options set before."""
@@ -84,7 +107,7 @@ class SB3VecEnv(Lifecycle, VecEnv):
                 self._queues.seed(row, np.random.default_rng(seed))
         if self._seeds[0] is not None:
             self._chooser = stream_generator(Stream.REPLAY, self._seeds[0])
-            self._failed = FailedScenarios.none(self.simulator.arm.n_joints)
+            self._failed = self._restored
         starts, goals = self._draw(np.arange(self.num_envs))
         for row, options in enumerate(self._options):
             fixed = fixed_scenario(options, self.simulator, 1)

@@ -7,7 +7,7 @@ import pytest
 
 from kinarm import load_recordings, record_path
 from kinarm.errors import InvalidInputError, StartInContactError
-from kinarm.viewer import replay_page
+from kinarm.viewer import replay_page, replay_path
 
 BELOW = np.deg2rad([0, 110, -60, 0, 0, 0])
 """The arm reaches into the ground."""
@@ -71,10 +71,12 @@ def test_ends_where_it_touches(simulator):
     assert simulator.world.in_contact(recording.refused)
 
 
-def test_it_is_replayed_and_saved(simulator, tmp_path):
+def test_replay_in_one_call(simulator, tmp_path):
     path = [np.zeros(6), BELOW]
+    page = replay_path("both", path, tmp_path / "path.html")
+    assert (tmp_path / "path.html").read_text(encoding="utf-8") == page.html
     recording = record_path(simulator.world, path)
-    assert replay_page(recording).html == replay_page(record_path("both", path)).html
+    assert replay_page(recording).html == page.html
     recording.save(tmp_path / "path.npz")
     assert load_recordings(tmp_path / "path.npz")[0].contact == recording.contact
 
@@ -91,9 +93,10 @@ def test_it_is_replayed_and_saved(simulator, tmp_path):
         ),
     ],
 )
-def test_bad_paths(simulator, path, message):
+def test_bad_paths(simulator, tmp_path, path, message):
     with pytest.raises(InvalidInputError, match=message):
-        record_path(simulator.world, path)
+        replay_path(simulator.world, path, tmp_path / "path.html")
+    assert not list(tmp_path.iterdir())
 
 
 def test_a_start_in_contact(simulator):

@@ -16,7 +16,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
 
-EXTRAS = ("peers", "ray", "render", "robots", "sb3", "slurm", "tune", "zoo")
+EXTRAS = ("minari", "peers", "ray", "render", "robots", "sb3", "slurm", "study", "tune", "zoo")
 
 
 def oldest(extra: str) -> Iterator[str]:

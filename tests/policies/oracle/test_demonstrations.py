@@ -1,5 +1,8 @@
 """Demonstrations held against the reference and the environment, and their files."""
 
+import subprocess
+import sys
+
 import numpy as np
 import pytest
 from reference_episodes import scripted
@@ -123,3 +126,49 @@ class TestFile:
         given = {**vars(shown), name: getattr(shown, name)[:-1]}
         with pytest.raises(InvalidInputError, match=r"must (have shape|be true)"):
             Demonstrations(**given)
+
+
+class TestMinari:
+    @pytest.fixture(autouse=True)
+    def minari(self, tmp_path, monkeypatch):
+        monkeypatch.setenv("MINARI_DATASETS_PATH", str(tmp_path / "sets"))
+        return pytest.importorskip("minari")
+
+    def test_is_read_back_with_its_environment(self, minari, shown):
+        shown.to_minari("kinarm/both-oracle-v0", author="Jane")
+        found = minari.load_dataset("kinarm/both-oracle-v0")
+        env = found.recover_environment()
+        assert env.unwrapped.simulator.problem.digest == PROBLEM.digest
+        assert found.total_episodes == len(shown)
+        options = [each["options"] for each in found.storage.get_episode_metadata(range(3))]
+        for episode, (rows, start, goal) in zip(found, motions(shown), strict=True):
+            np.testing.assert_array_equal(episode.observations[:-1], shown.observations[rows])
+            np.testing.assert_array_equal(episode.actions, shown.actions[rows])
+            np.testing.assert_array_equal(episode.rewards, shown.rewards[rows])
+            if episode.id < len(options):
+                np.testing.assert_array_equal(options[episode.id]["start"], start)
+                np.testing.assert_array_equal(options[episode.id]["goal"], goal)
+                seen, _ = env.reset(options=options[episode.id])
+                np.testing.assert_array_equal(seen, episode.observations[0])
+                for action, then in zip(episode.actions, episode.observations[1:], strict=True):
+                    np.testing.assert_array_equal(env.step(action)[0], then)
+
+    def test_its_environment_needs_no_import_of_kinarm(self, shown, tmp_path):
+        shown.to_minari("right-v0")
+        program = "import minari; print(minari.load_dataset('right-v0').recover_environment())"
+        done = subprocess.run(
+            [sys.executable, "-c", program], capture_output=True, text=True, check=False
+        )
+        assert "kinarm/Reach-v0" in done.stdout, done.stderr
+
+    def test_refusals(self, shown, tmp_path):
+        for name in ("right", "right oracle-v0", "/-v0"):
+            with pytest.raises(InvalidInputError, match="dataset_id must be like"):
+                shown.to_minari(name)
+        assert not (tmp_path / "sets" / "right").exists()
+        shown.to_minari("right-v0")
+        with pytest.raises(OutputError, match="exists: minari.delete_dataset"):
+            shown.to_minari("right-v0")
+        (tmp_path / "sets" / "file").write_text("")
+        with pytest.raises(OutputError, match="cannot write"):
+            shown.to_minari("file/right-v0")

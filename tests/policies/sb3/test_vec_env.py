@@ -8,7 +8,7 @@ from gymnasium.utils.env_checker import data_equivalence
 pytest.importorskip("stable_baselines3")
 
 from stable_baselines3.common.monitor import Monitor
-from stable_baselines3.common.vec_env import DummyVecEnv
+from stable_baselines3.common.vec_env import DummyVecEnv, VecFrameStack
 
 from kinarm.envs import ClosedEnvironmentError, ReachVectorEnv, ResetNeededError
 from kinarm.errors import InvalidInputError, StartInContactError
@@ -244,3 +244,32 @@ class TestReplay:
         self.play(env, 80)
         env.seed(4)
         assert [goal for goal, _ in self.play(env, 80)] == [goal for goal, _ in first]
+
+    def test_what_failed_goes_on_elsewhere(self, tmp_path):
+        """Saved by NumPy, given back through a wrapper, before or after a learner's seed."""
+        env = sb3_vec_env(FLAT, 10, seed=4, replay_share=0.5)
+        ended = self.play(env, 80)
+        failed = [goal for goal, info in ended if not info["is_success"]]
+        np.testing.assert_array_equal(env.failed.goals, failed)
+        np.savez(tmp_path / "failed.npz", **env.failed._asdict())
+        env.seed(7)
+        env.restore_failed(*env.failed)
+        wanted = self.play(env, 80)
+        assert any(info["replayed"] for _, info in wanted[:10])
+        for later in (False, True):
+            other = sb3_vec_env(FLAT, 10, seed=None if later else 7, replay_share=0.5)
+            with np.load(tmp_path / "failed.npz") as saved:
+                VecFrameStack(other, 2).restore_failed(**saved)
+            if later:
+                other.seed(7)
+            assert [goal for goal, _ in self.play(other, 80)] == [goal for goal, _ in wanted]
+            np.testing.assert_array_equal(other.failed.starts, env.failed.starts)
+
+    def test_failures_that_cannot_be_given_back(self):
+        env, home = sb3_vec_env(FLAT, 2, replay_share=0.5), np.zeros((1, 6))
+        with pytest.raises(InvalidInputError, match="starts"):
+            env.restore_failed(home[:, :5], np.ones((1, 3)))
+        with pytest.raises(InvalidInputError, match="lies outside the limits"):
+            env.restore_failed(home + 9, np.ones((1, 3)))
+        with pytest.raises(InvalidInputError, match="need an environment with a replay_share"):
+            sb3_vec_env(FLAT, 2).restore_failed(home, np.ones((1, 3)))
