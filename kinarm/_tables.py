@@ -130,13 +130,21 @@ class TableOptions(Checked):
 
 
 def csv_text(rows: Sequence[Mapping[str, Any]]) -> str:
-    """Rows as CSV, with a heading; a value that one has not is empty."""
+    """Rows as CSV, with a heading; a value that one has not is empty.
+
+    Texts that a spreadsheet would take for a formula get an apostrophe in front.
+    """
     names = dict.fromkeys(name for row in rows for name in row)
     text = io.StringIO()
     writer = csv.DictWriter(text, [*names], lineterminator="\n")
     writer.writeheader()
-    writer.writerows(rows)
+    writer.writerows({name: _harmless(value) for name, value in row.items()} for row in rows)
     return text.getvalue()
+
+
+def _harmless(value: Any) -> Any:
+    formula = isinstance(value, str) and value.startswith(("=", "+", "-", "@"))
+    return f"'{value}" if formula else value
 
 
 class _Filled(NamedTuple):

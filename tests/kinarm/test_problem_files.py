@@ -103,6 +103,7 @@ class TestFile:
             ('[task]\ngoal_regions = ["up"]', "goal region in task.goal_regions: 'up'"),
             ('base = "up"', "base must be one of left, right, both, got 'up'"),
             ("[task", r"not a problem file: .* \(at end of document\)"),
+            ("a" + 100 * ".a", "not a problem file: a key has more than 100 parts"),
             (
                 '[[scene.obstacles]]\nname = "post"\nlower = [0, 0, 0]',
                 r"'scene.obstacles\[0\].upper' is missing: Opposite corners",
