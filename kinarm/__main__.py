@@ -1,12 +1,13 @@
 """``kinarm``, or ``python -m kinarm``, lists commands; ``kinarm eval`` runs one."""
 
 import argparse
+import subprocess
 import sys
 from collections.abc import Sequence
 from importlib import import_module
 
 from kinarm._command_line import run_command
-from kinarm._parser import Parser
+from kinarm._parser import SHELLS, CommandParser
 
 PROG = "kinarm"
 
@@ -35,9 +36,9 @@ def main(arguments: Sequence[str] | None = None) -> None:
 
 
 def _explain(typed: Sequence[str]) -> None:
-    """Print help or version, or refuse an unknown command."""
+    """Print help, version or completion, or refuse an unknown command."""
     lines = (f"  {purpose:<42} {PROG}-{name}" for name, (_, purpose) in COMMANDS.items())
-    parser = Parser(
+    parser = CommandParser(
         prog=PROG,
         usage=f"{PROG} COMMAND ... [options]",
         description="Learn to reach with a simulated robot arm.\n\nto:\n" + "\n".join(lines),
@@ -46,7 +47,16 @@ def _explain(typed: Sequence[str]) -> None:
     parser.add_argument(
         "command", nargs="?", choices=COMMANDS, metavar="COMMAND", help=argparse.SUPPRESS
     )
-    parser.parse_args(typed)
+    parser.add_argument(
+        "--print-completion",
+        choices=SHELLS,
+        help="Print the completion script of a shell for all commands and exit",
+    )
+    shell = parser.parse_args(typed).print_completion
+    if shell is not None:
+        for name in COMMANDS:
+            words = [sys.executable, "-m", "kinarm", name, "--print-completion", shell]
+            subprocess.run(words, check=True)
 
 
 if __name__ == "__main__":

@@ -44,8 +44,9 @@ def add_options(
     A field's metadata may hold ``flag`` (another name of the option; without
     dashes, of a positional argument), ``bare`` (values are also taken without
     the option), ``metavar``, ``repeat`` (repetitions of the option give a
-    tuple, else its several values), ``parse`` (makes the value of the text)
-    and ``names`` (lists names for help).
+    tuple, else its several values), ``parse`` (makes the value of the text),
+    ``names`` (lists names for help and completion) and ``completes`` (lists
+    them for completion alone).
 
     Parameters
     ----------
@@ -102,14 +103,16 @@ def _add_option(
         parser.add_argument(flag, action=action, **options)
         return
     values = _value_options(item, hint, flag)
-    parser.add_argument(flag, **options, **values)
+    added = [parser.add_argument(flag, **options, **values)]
     if item.metadata.get("bare"):
         several = {
             "nargs": "*" if get_origin(hint) is tuple else "?",
             "help": f"The same as {flag}",
         }
         bare = {"default": argparse.SUPPRESS, **values, **several}
-        parser.add_argument(f"{prefix}{item.name}", **bare)
+        added.append(parser.add_argument(f"{prefix}{item.name}", **bare))
+    for argument in added:
+        argument.completes = _completes(item, hint, known)  # type: ignore[attr-defined]
 
 
 def _value_options(item: Field[Any], hint: Any, flag: str) -> dict[str, Any]:
@@ -152,6 +155,17 @@ def _argument_type(make: Callable[[str], Any], hint: Any) -> Callable[[str], Any
         return value
 
     return parsed
+
+
+def _completes(item: Field[Any], hint: Any, known: Sequence[str]) -> Any:
+    """Completion by ``"file"``, ``"folder"`` or a function of names."""
+    if "completes" in item.metadata:
+        return item.metadata["completes"]
+    if known:
+        return lambda: known
+    if item.metadata.get("metavar") in ("DIR", "FOLDER"):
+        return "folder"
+    return "file" if Path in alternatives(hint) or "FILE" in str(item.metadata) else None
 
 
 def option_name(item: Field[Any], prefix: str = "") -> str:

@@ -15,6 +15,7 @@ from kinarm._command_line import option_name
 from kinarm._console import working
 from kinarm._files import check_output
 from kinarm.errors import FROM_ZERO, InvalidInputError
+from kinarm.evaluation.request import policy_choices
 from kinarm.problem_options import ProblemOptions, say_choices
 
 if TYPE_CHECKING:
@@ -91,8 +92,13 @@ class ReplayRequest(ProblemOptions):
         If a number is out of range, or two fields do not go together.
     """
 
-    source: Path | None = field(default=None, metadata={"flag": "source", "metavar": "FILE"})
-    policy: str | None = field(default=None, metadata={"metavar": "NAME_OR_FILE"})
+    source: Path | None = field(
+        default=None,
+        metadata={"flag": "source", "metavar": "FILE", "completes": policy_choices},
+    )
+    policy: str | None = field(
+        default=None, metadata={"metavar": "NAME_OR_FILE", "completes": policy_choices}
+    )
     vec_normalize: Path | None = field(default=None, metadata={"metavar": "FILE|none"})
     wrapper: str | None = field(default=None, metadata={"metavar": "MODULE:FUNCTION"})
     compare: tuple[str, str] | None = field(default=None, metadata={"metavar": ("A", "B")})
