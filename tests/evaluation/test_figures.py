@@ -28,13 +28,13 @@ def test_a_symmetric_policy_has_one_name_on_all_its_problems(train_novice):
 
 
 def test_files_are_written_and_reproducible(tmp_path):
-    figure, ((axes,),) = panels_figure((3.0, 2.0), 1, 1)
-    axes.plot([0, 1], label="line")
-    axes.legend()
     contents = []
     for name in ("one", "two"):
         folder = tmp_path / name
         folder.mkdir()
+        figure, ((axes,),) = panels_figure((3.0, 2.0), 1, 1)
+        axes.plot([0, 1], label="line")
+        axes.legend()
         paths = save_figure(figure, folder, "histogram")
         assert [path.name for path in paths] == ["histogram.png", "histogram.svg"]
         contents.append([path.read_bytes() for path in paths])
