@@ -93,6 +93,18 @@ def only_writer(path: str | Path) -> Iterator[None]:
             lock.unlink(missing_ok=True)
 
 
+def is_being_written(path: str | Path) -> bool:
+    """Whether a process is the `only_writer` of an output."""
+    try:
+        with _lock_of(path).open("rb") as file:
+            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        return True
+    except OSError:
+        return False
+    return False
+
+
 def _lock_of(path: str | Path) -> Path:
     """File that is locked while an output is made."""
     target = absolute(path)

@@ -1,5 +1,6 @@
 """Executors of a cluster: Ray, and array jobs of Slurm."""
 
+import hashlib
 import os
 import pickle
 import socket
@@ -8,6 +9,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import cache, partial
+from importlib import import_module
 from itertools import islice
 from pathlib import Path
 from typing import Any
@@ -17,14 +19,24 @@ from kinarm._interrupts import kept_from_children
 from kinarm.errors import InvalidInputError, MissingExtraError, WorkerError
 from kinarm.evaluation.experiments.executors import Failure, attempt
 from kinarm.policies.oracle import ORACLE_SEMANTICS
-from kinarm.policies.provenance import package_versions, source_commit
+from kinarm.policies.provenance import package_versions
+
+PACKAGES = ("kinarm", "kinarm.policies", "kinarm.evaluation", "kinarm.data")
+"""All of kinarm; in a clone beside each other, else in the first."""
 
 
 @cache
 def identity() -> dict[str, str]:
-    """Versions of packages and of results, and the commit of kinarm's source."""
+    """Versions of packages and of results, and the hash of kinarm's source."""
+    files = {
+        f"{package}.{'.'.join(path.relative_to(folder).parts)}": path
+        for package in PACKAGES
+        for folder in import_module(package).__path__[:1]
+        for path in Path(folder).rglob("*.py")
+    }
+    source = hashlib.sha256(b"".join(files[name].read_bytes() for name in sorted(files)))
     results = {"semantics": SEMANTICS, "oracle semantics": ORACLE_SEMANTICS}
-    return {**package_versions(), **results, "commit of kinarm": source_commit()}
+    return {**package_versions(), **results, "source of kinarm": source.hexdigest()[:12]}
 
 
 def do_alike(work: Callable[[Any], Any], expected: Mapping[str, str], task: Any) -> Any:

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kinarm._console import ProgressLine
-from kinarm._files import absolute
+from kinarm._files import absolute, is_being_written
 from kinarm._interrupts import kept_from_children
 from kinarm._parallel import available_threads
 from kinarm.errors import InvalidInputError, TrainingFailedError, whole_number
@@ -201,6 +201,10 @@ class Study:
         told = [f"{self.experiment.name}: {finished} of {len(self.runs)} trainings finished"]
         if shares := self.store.shares(remain):
             told[0] += f", {len(shares)} under way {100 * np.mean(shares):.0f} %"
+        if remain and is_being_written(self.store.folder):
+            told[0] += ", running"
+        elif remain:
+            told[0] += ", stopped; the command that made it goes on"
         return told + [f"failed: {run.name}: {error}" for run, error in self.failures.items()]
 
     @cached_property

@@ -178,6 +178,13 @@ class PPOConfig(TrainingConfig):
         """The problem with the reward and tolerance of these settings."""
         return self.problem.replace(reward=self.reward, tolerance=self.training_tolerance)
 
+    @property
+    def can_extend(self) -> bool:
+        """Whether a longer training begins just as this one goes."""
+        settled = self.widening == 0 and self.initial_penalty == 1
+        unset = self.final_log_std is None and self.initial_tolerance is None
+        return self.learning_rate_schedule == "constant" and settled and unset
+
     def start_spread_at(self, done: float) -> float:
         """Spread of the start configurations after this share of the training."""
         return self.problem.task.start_spread * self._widened(self.initial_start_spread, 1.0, done)

@@ -9,7 +9,9 @@ import time
 import pytest
 
 from kinarm._files import (
+    check_folder,
     check_output,
+    is_being_written,
     only_writer,
     write_atomically,
     write_text,
@@ -122,6 +124,23 @@ class TestOnlyWriter:
             write_text(path, "free again")
         assert list(tmp_path.iterdir()) == [path]
 
+    def test_what_it_writes_is_being_written(self, tmp_path):
+        path = tmp_path / "one"
+        with only_writer(path):
+            assert is_being_written(path)
+        (tmp_path / ".one.lock").touch()  # which a process that was killed left behind
+        assert not is_being_written(path)
+
+
+def test_a_folder_is_made_unless_a_file_is_in_the_way(tmp_path):
+    check_folder(tmp_path / "new" / "newer")
+    assert (tmp_path / "new" / "newer").is_dir()
+    (tmp_path / "file").write_text("")
+    with pytest.raises(OutputError, match="cannot write to .*file"):
+        check_folder(tmp_path / "file" / "below")
+
+
+class TestCheckOutput:
     def test_makes_the_folder(self, tmp_path):
         check_output(tmp_path / "a" / "b" / "new.npz")
         assert list((tmp_path / "a").glob("**/*")) == [tmp_path / "a" / "b"]

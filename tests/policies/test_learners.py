@@ -126,3 +126,7 @@ def test_a_result_describes_itself_in_a_line():
     assert repr(result).startswith("TrainingResult(Policy(ars paper*, problem 'left', seed 0")
     assert "3 iterations, 0.0" in repr(result)
     assert len(repr(result)) < 130
+
+
+def test_what_settings_say_of_a_training_if_a_learner_says_no_more():
+    assert not TrainingConfig(iterations=7).can_extend

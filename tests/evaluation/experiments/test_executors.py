@@ -111,9 +111,12 @@ def test_a_worker_ends_when_its_parent_has_ended(monkeypatch):
     assert list(parents) == []
 
 
-def test_workers_agree_on_packages_results_and_the_source():
-    known = {"python", "numpy", "numba", "coal", "pin", "semantics", "commit of kinarm"}
-    assert known <= set(clusters.identity())
+def test_workers_agree_on_packages_results_and_all_of_the_source(monkeypatch):
+    known = {"python", "numpy", "numba", "coal", "pin", "semantics", "source of kinarm"}
+    before = clusters.identity()
+    assert known <= set(before)
+    monkeypatch.setattr(clusters, "PACKAGES", clusters.PACKAGES[:-1])
+    assert clusters.identity.__wrapped__()["source of kinarm"] != before["source of kinarm"]
 
 
 @needs_ray

@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from small_studies import Counting, contents
+from small_studies import SMALL, Counting, contents
 
 from kinarm.errors import InvalidInputError, OutputError, TrainingFailedError
 from kinarm.evaluation import evaluate, oracle_bounds
@@ -109,6 +109,39 @@ class TestGoingOn:
         assert len(executor.tasks) == 3 * 3 - 4
         assert len(study) == 9
 
+    def test_more_iterations_go_on_where_the_shorter_training_ended(self, small):
+        small().run(jobs=1)
+        fixed = {**SMALL["fixed"], "iterations": 8}
+        executor = Counting()
+        study = small(fixed=fixed).run(executor=executor)
+        assert [task.start.state.iteration for task in executor.tasks] == [3] * 4
+        straight = small("straight", fixed=fixed).run(jobs=1)
+        for run in study.runs:
+            went_on, at_once = (
+                each.store.path("runs", run).read_bytes() for each in (study, straight)
+            )
+            assert went_on == at_once
+            times = study.store.made(run)
+            assert len(times.points) == len(study.finished[run].curve)
+
+    def test_but_not_if_the_schedule_depends_on_them(self, small):
+        changes = {"step_size_schedule": "linear"}
+        small(fixed={**SMALL["fixed"], **changes}).run(jobs=1)
+        executor = Counting()
+        small(fixed={**SMALL["fixed"], **changes, "iterations": 5}).run(executor=executor)
+        assert [task.start for task in executor.tasks] == [None] * 4
+
+    def test_a_longer_training_of_ppo(self, small):
+        fixed = {"n_envs": 2, "n_steps": 32, "batch_size": 32, "n_epochs": 2}
+        changes = {"learners": "ppo", "seeds": 1, "grid": {}}
+        small(fixed={**fixed, "iterations": 2}, **changes).run(jobs=1)
+        executor = Counting()
+        long = {"fixed": {**fixed, "iterations": 5}, **changes}
+        study = small(**long).run(executor=executor)
+        assert [task.start.state.iteration for task in executor.tasks] == [2]
+        straight = small("straight", **long).run(jobs=1)
+        assert contents(straight.store.folder).items() <= contents(study.store.folder).items()
+
     def test_an_interrupted_training_goes_on_where_it_was(self, small, monkeypatch):
         monkeypatch.setattr(training, "CHECKPOINT_SECONDS", 0.0)
         details = {"points": 3, "spacing": "geometric", "count": 5, "seed": 1}
@@ -126,7 +159,7 @@ class TestGoingOn:
         with pytest.raises(KeyboardInterrupt):
             study.run(executor=Counting())
         monkeypatch.undo()
-        assert "0 of 1 trainings finished, 1 under way 67 %" in study.status()[0]
+        assert "0 of 1 trainings finished, 1 under way 67 %, stopped" in study.status()[0]
         executor = Counting()
         study.run(executor=executor)
         assert [task.start.state.iteration for task in executor.tasks] == [2]
@@ -172,7 +205,7 @@ def test_each_write_fails_in_turn(small, monkeypatch, error):
         assert list(study.store.folder.rglob("*.part")) == []
         if len(calls) < failing_at:
             break
-    assert failures == len(calls) == 1 + 2 * 2  # the experiment, two trainings
+    assert failures == len(calls) == 1 + 2 * 3  # the experiment, two trainings
 
 
 class TestFailures:
@@ -207,8 +240,14 @@ class TestFailures:
 
 class TestStatus:
     def test_stopped_and_done(self, small, finished):
-        assert small().status() == ["small: 0 of 4 trainings finished"]
+        stopped = "small: 0 of 4 trainings finished, stopped; the command that made it goes on"
+        assert small().status() == [stopped]
         assert finished.status() == ["small: 4 of 4 trainings finished"]
+
+    def test_under_way(self, small):
+        study = small()
+        with study.store.writing(study.experiment):
+            assert study.status() == ["small: 0 of 4 trainings finished, running"]
 
 
 @pytest.mark.slow
