@@ -38,7 +38,7 @@ def assert_same_capsules(arm, expected):
     shapes = arm.geometry.geometryObjects
     assert [shape.parentJoint for shape in shapes] == list(range(7))
     for shape, (start, end, radius) in zip(shapes, expected, strict=True):
-        corners, rounding = inner_capsule(shape)
+        corners, rounding, _ = inner_capsule(shape)
         np.testing.assert_allclose(sorted(corners.tolist()), sorted([start, end]), atol=1e-12)
         assert rounding == radius
 

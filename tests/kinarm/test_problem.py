@@ -66,6 +66,7 @@ CHANGES = {
     "scene.obstacles[0].yaw": {"scene": Scene(obstacles=TURNED)},
     "scene.random_bodies[0].name": {"scene": Scene(random_bodies=(BALL,))},
     "scene.seed": {"scene": Scene(seed=1)},
+    "task.reachable_goals": {"reachable_goals": True},
     "task.starts[0][0]": {"starts": ((0.1, 0, 0, 0, 0, 0),)},
     "scene.goal_regions[0].lower[2]": {"scene": Scene(goal_regions=(OTHER_REGION,))},
     "arm": {"arm": "paper_flange"},

@@ -14,7 +14,7 @@ from kinarm.kernels.placing import uniform
 from kinarm.policies import Oracle
 from kinarm.problem import PROBLEMS, ReachProblem
 from kinarm.recording import record_rollouts
-from kinarm.scene import PAPER_BENCHES, Scene
+from kinarm.scene import PAPER_BENCHES, Mount, Scene
 from kinarm.simulator import Simulator
 from kinarm.viewer import replay_page
 
@@ -242,7 +242,8 @@ def test_goals_are_reachable_where_a_task_asks_for_it():
 
 
 def test_goals_that_nothing_reaches_are_refused():
-    far = PROBLEMS["both"].replace(reachable_goals=True, arm="so101")
+    scene = Scene(mount=Mount(position=(3.0, 0.0, 0.0)))
+    far = PROBLEMS["both"].replace(reachable_goals=True, scene=scene)
     with pytest.raises(KinarmError, match="nothing free of contact is found at the goal"):
         Simulator(far).sample(np.random.default_rng(0), 10)
 
