@@ -55,14 +55,11 @@ def address(document, evaluations, tmp_path_factory) -> str:
 
 @pytest.fixture
 def visit(new_context, address):
-    """Open the report without a network; nothing may be fetched and nothing may go wrong.
-
-    Who wants motion says so: what plays by itself is drawn without end, and pages scroll slowly.
-    """
+    """Open the report without network or motion; nothing may be fetched or go wrong."""
     contexts, requests, problems = [], [], []
 
-    def call(motion="reduce", **settings):
-        context = new_context(reduced_motion=motion, **settings)
+    def call(**settings):
+        context = new_context(reduced_motion="reduce", **settings)
         contexts.append(context)
         page = context.new_page()
         page.on("request", lambda request: requests.append(request.url))
@@ -134,11 +131,8 @@ def test_replay_waits_until_it_is_near_and_rests_out_of_sight(visit):
     wait_until(page, f"!{PLAYER}.state.playing")
 
 
-MOVING_PHONE = {**PHONE, "motion": "no-preference"}
-
-
 def test_a_row_chooses_the_trial(visit, chosen):
-    page = visit(**MOVING_PHONE)
+    page = visit(**PHONE)
     start_replay(page)
     for place in (len(chosen) - 1, 2):
         page.locator(f"tr[data-replay='{place}'] th").click()
@@ -149,7 +143,6 @@ def test_a_row_chooses_the_trial(visit, chosen):
             chosen[place].trial,
         )
         assert page.locator("tr[aria-current]").get_attribute("data-replay") == str(place)
-        # With motion, the page scrolls there smoothly.
         top = "document.querySelector('#worst iframe').getBoundingClientRect().y"
         wait_until(page, f"0 <= {top} && {top} < {PHONE['viewport']['height'] / 2}")
 
