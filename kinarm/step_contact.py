@@ -61,7 +61,7 @@ class StepContact:
     def steps_of(
         self, starts: Array, ends: Array, scenes: Array, taken: NDArray[np.int64]
     ) -> Iterator[Step]:
-        """Steps of episodes.
+        """Steps of episodes, each to be used before the next.
 
         Parameters
         ----------
@@ -72,10 +72,16 @@ class StepContact:
         taken : ndarray of int, shape (n,)
             Steps that the episodes have taken before.
         """
-        ways = self.moved(scenes, taken), self.moved(scenes, taken + 1)
+        model, before = self.contact_model, self.moved(scenes, taken)
+        after = self.moved(scenes, taken + 1)
         for row, (start, end) in enumerate(zip(starts, ends, strict=True)):
-            bodies = [way[row] for way in ways] if len(scenes) else []
-            yield Step(self.contact_model, start, end, *bodies)
+            if not len(scenes):
+                yield Step(model, start, end)
+            elif not len(model.shapes.moving):
+                # They are placed once for all of the step.
+                yield Step(model.at(scenes[row]), start, end)
+            else:
+                yield Step(model, start, end, before[row], after[row])
 
     def moved(self, scenes: Array, taken: NDArray[np.int64]) -> Array:
         """Rows of the bodies of episodes after some steps; see `steps_of`."""

@@ -10,7 +10,6 @@ from kinarm.contact_shapes import BETWEEN_CAPSULES, WITH_HALFSPACE, ContactShape
 from kinarm.kernels.compiling import Array, helper, inlined
 from kinarm.kernels.distance import between_segments, closest_to_box
 from kinarm.kernels.kinematics import to_frame
-from kinarm.kernels.planes import DEPTH as DEPTH
 from kinarm.kernels.planes import axis_in_world, is_placed, surface
 
 

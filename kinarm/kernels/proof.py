@@ -12,9 +12,9 @@ from kinarm.chain import Chain
 from kinarm.contact_shapes import PLANE, WITH_HALFSPACE, ContactShapes
 from kinarm.kernels.compiling import Array, helper, inlined
 from kinarm.kernels.lanes import any_lane, as_numbers, lane_bits, select
-from kinarm.kernels.overlap import DEPTH, overlap
-from kinarm.kernels.planes import EVERYDAY, FINE, GAP, height_above, propose, separate
-from kinarm.kernels.session import Alone, Block, place_between, put, take, take_rows
+from kinarm.kernels.overlap import overlap
+from kinarm.kernels.planes import DEPTH, EVERYDAY, FINE, GAP, height_above, propose, separate
+from kinarm.kernels.session import Alone, Block, moving_frame, place_between, put, take, take_rows
 
 MARGIN = 2e-6
 """Distance beyond which freedom is claimed [m].
@@ -152,7 +152,7 @@ def prove_alone(
     # Better the planes of pairs that are not proven, and list those that remain.
     take_rows(poses, lane, alone.after)
     for k in range(shapes.moving.shape[0]):
-        frame = poses.shape[0] - shapes.placed.shape[0] + shapes.moving[k]
+        frame = moving_frame(shapes, k, poses)
         for i in range(3):
             alone.moved[k, i] = as_numbers(before)[frame, 13 + i, lane]
             alone.moved[k, 3 + i] = as_numbers(poses)[frame, 13 + i, lane]

@@ -147,15 +147,21 @@ def put_scene(scenes: Array, e: int, lane: int, poses: Array) -> None:
 
 
 @inlined
+def moving_frame(shapes: ContactShapes, k: int, poses: Array) -> int:
+    """Row in the poses of the k-th body that moves."""
+    return int(poses.shape[0] - shapes.placed.shape[0] + shapes.moving[k])
+
+
+@inlined
 def move_bodies(
     e: int, step: int, lane: int, shapes: ContactShapes, rules: Rules, scenes: Array, poses: Array
 ) -> None:
     """Put an episode's moving bodies where they are after so many steps, in a lane of poses."""
-    numbers, first = as_numbers(poses), poses.shape[0] - shapes.placed.shape[0]
+    numbers = as_numbers(poses)
     for k in range(shapes.moving.shape[0]):
-        body = shapes.moving[k]
+        body, frame = shapes.moving[k], moving_frame(shapes, k, poses)
         for i in range(3):
-            numbers[first + body, 13 + i, lane] = scenes[e, body, 13 + i] + rules.moves[step, k, i]
+            numbers[frame, 13 + i, lane] = scenes[e, body, 13 + i] + rules.moves[step, k, i]
 
 
 @inlined
@@ -176,7 +182,7 @@ def place_between(
         alone.q[0, joint] = end if k == parts else start + k / parts * (end - start)
     forward_kinematics(chain, alone.q, 0, poses)
     for moving in range(shapes.moving.shape[0]):
-        frame = poses.shape[0] - shapes.placed.shape[0] + shapes.moving[moving]
+        frame = moving_frame(shapes, moving, poses)
         for i in range(3):
             start, end = alone.moved[moving, i], alone.moved[moving, 3 + i]
             poses[frame, 13 + i] = end if k == parts else start + k / parts * (end - start)

@@ -34,8 +34,8 @@ from kinarm.kernels.kinematics import (
     to_world,
 )
 from kinarm.kernels.lanes import any_lane, select
-from kinarm.kernels.overlap import DEPTH, is_exact, radius_of
-from kinarm.kernels.planes import axis_in_world, surface
+from kinarm.kernels.overlap import is_exact, radius_of
+from kinarm.kernels.planes import DEPTH, axis_in_world, surface
 
 SWEEPS = 3
 """Passes of the descent over the joints."""

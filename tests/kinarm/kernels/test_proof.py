@@ -5,7 +5,7 @@ import pytest
 from hanging_chain import LENGTHS, RADIUS, SLAB, tips
 from step_proofs import proofs
 
-from kinarm.kernels.overlap import DEPTH
+from kinarm.kernels.planes import DEPTH
 from kinarm.kernels.proof import MARGIN
 
 

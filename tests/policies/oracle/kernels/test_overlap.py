@@ -8,7 +8,7 @@ from hanging_chain import BASE, LENGTHS, RADIUS, SLAB, tips
 from numba import njit
 
 from kinarm.kernels.kinematics import POSE, forward_kinematics, place_bodies
-from kinarm.kernels.overlap import DEPTH
+from kinarm.kernels.planes import DEPTH
 from kinarm.policies.oracle.kernels.box_proofs import overlaps
 from kinarm.scene import Obstacle
 
