@@ -16,7 +16,7 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from docs.measurements.self_contact import PIECES
+from docs.measurements.self_contact import pieces_of
 from kinarm import Arm, ArmSpecification, Mount, Scene
 from kinarm.collision import ContactModel
 from kinarm.contact_pairs import make_verdicts_reliable
@@ -81,7 +81,7 @@ def main(folder: Path) -> None:
         tool_frame="tool0",
         home=(0.0, -np.pi / 2, np.pi / 2, -np.pi / 2, -np.pi / 2, 0.0),
     )
-    arms = [Arm.load(arm), Arm.load(arm, pieces=PIECES["ur5"])]
+    arms = [Arm.load(arm), Arm.load(arm, pieces=pieces_of("ur5"))]
     robots = [*map(Robot.of_kinarm, arms), Robot.of_urdf(folder)]
     rows, differing, free = [], Counter(), np.zeros((3, 3), dtype=int)
     with tempfile.TemporaryDirectory() as place:

@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from docs.measurements.mjcf import mjcf
+from docs.measurements.self_contact import of_hulls
 from docs.measurements.turns import alternated
 from kinarm.envs import ReachVectorEnv
 from kinarm.evaluation.bench import VECTOR_ENVS
@@ -72,7 +73,10 @@ def compared(
 def compare_mujoco(policy: Policy, repetitions: int) -> Iterator[Comparison]:
     """MuJoCo's rollouts in C of a policy's arm, and of UR5 with the convex hulls of its meshes."""
     ur5 = recipe(
-        "ars", "paper", problem=PROBLEMS["right"].replace(arm="ur5"), iterations=ROBOT_ITERATIONS
+        "ars",
+        "paper",
+        problem=PROBLEMS["right"].replace(arm=of_hulls("ur5"), tested_configurations=4),
+        iterations=ROBOT_ITERATIONS,
     )
     novice = train_policy(ur5).policy
     for arm, each in ((f"arm `{policy.problem.arm.name}`", policy), ("UR5 with hulls", novice)):

@@ -14,20 +14,23 @@ from kinarm.evaluation.self_contact import SelfContact
 
 CONFIGURATIONS = 20_000
 
-PIECES = {
-    "ur3": {"upper_arm_link": 3, "forearm_link": 3},
-    "ur5": {"base_link": 2, "upper_arm_link": 4, "forearm_link": 3},
-    "ur10": {"upper_arm_link": 3, "forearm_link": 3},
-}
-"""Pieces that meshes are cut into, where hulls touch much more often."""
+
+def pieces_of(name: str) -> dict[str, int]:
+    """Into how many pieces the file of a named arm cuts meshes, by link."""
+    return Arm.load(name).specification.completed().pieces or {}
+
+
+def of_hulls(name: str) -> Arm:
+    """A named arm with the hulls of its meshes, whatever its file cuts."""
+    return Arm.load(name, pieces=dict.fromkeys(pieces_of(name), 1))
 
 
 def row(name: str) -> list[str]:
     """Shares of an arm; a cell more tells how often pieces miss what meshes touch."""
-    pieces = PIECES.get(name, {})
+    pieces = pieces_of(name)
     hulls, cut = (
-        SelfContact(contact_on_bare_ground(Arm.load(name, pieces=each)), CONFIGURATIONS)
-        for each in ({}, pieces)
+        SelfContact(contact_on_bare_ground(arm), CONFIGURATIONS)
+        for arm in (of_hulls(name), Arm.load(name))
     )
     missed = (cut.meshes & ~cut.simulated).sum()
     shares = [hulls.simulated.mean(), cut.meshes.mean(), cut.simulated.mean()]

@@ -22,7 +22,7 @@ STEP = 0.2
 TERMS = (
     "free configurations of UR5 between the paper's benches, without ground, one thread. VAMP: 40 "
     "spheres for arm and gripper, float32, compiled for the robot and this machine; kinarm: "
-    "convex hulls of the meshes, float64, any arm, and tool points as well"
+    "convex pieces of the meshes, float64, any arm, and tool points as well"
 )
 
 Compared = tuple[str, str, str, Callable[[], int], Callable[[], int]]
