@@ -110,7 +110,7 @@ def measure_rollouts(
     rows = []
     for name, run in runs.items():
         before = simulator.checked_by_coal
-        tested = simulator.problem.stepping.tested_configurations * run()
+        tested = simulator.world.rules.parts * run()
         share = (simulator.checked_by_coal - before) / tested
         for threads in sorted({1, available_threads()}):
             simulator.threads = threads

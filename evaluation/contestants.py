@@ -21,7 +21,7 @@ from kinarm.networks import Layer, Networks, PolicyFunction
 from kinarm.observation import observation_size
 from kinarm.policies.policy import Policy
 from kinarm.policies.provenance import normalization_remark
-from kinarm.problem import ReachProblem
+from kinarm.problem import PROBLEMS, ReachProblem
 
 NEVER = sys.float_info.min
 """A tolerance that nothing meets [m]."""
@@ -79,10 +79,22 @@ class Contestant:
         remarks = [*filter(None, [normalization_remark(config), *self.remarks])]
         return f"{self.name}: {'; '.join(remarks)}" if remarks else ""
 
+    def note_on(self, problem: ReachProblem) -> str:
+        """The note, and how training tested steps for contact if it was not as in a problem."""
+        faced = problem.stepping.tested_configurations
+        trained = self.policy.problem.stepping.tested_configurations if self.policy else faced
+        where = f"at {trained} configurations" if trained else "throughout"
+        assumed = "" if trained == faced else f"training tested steps for contact {where}"
+        return "; ".join(filter(None, [self.note, assumed]))
+
     @property
     def problem(self) -> ReachProblem | None:
-        """The problem that it was trained for, if any."""
-        return self.policy.problem if self.policy else None
+        """The problem that it was trained for, if any; of the paper's, as steps are tested now."""
+        if self.policy is None:
+            return None
+        trained_for = self.policy.problem
+        now = PROBLEMS.get(trained_for.name, trained_for)
+        return now if trained_for.tested_as(now).digest == now.digest else trained_for
 
     def serves(
         self,
@@ -92,11 +104,12 @@ class Contestant:
         """Whether it was made for a problem.
 
         What was not trained is for every problem. A policy with a mirror learnt one side, so it is
-        for each side alone, too. ``change`` is made to the problem that it was trained for.
+        for each side alone, too. ``change`` is made to the problem that it was trained for. How
+        steps are tested for contact does not matter.
         """
         if self.policy is None:
             return True
-        trained_for = change(self.policy.problem)
+        trained_for = change(self.policy.problem).tested_as(problem)
         if self.policy.mirror is not None:
             return trained_for.covers(problem)
         return trained_for.digest == problem.digest

@@ -139,7 +139,7 @@ class Evaluation:
             **common_figures(self.name, [self]),
             metrics=self.metrics,
             training_seed=self.contestant.seed,
-            note=self.contestant.note,
+            note=self.contestant.note_on(self.problem),
             outcomes=ends,
             held=held or msgspec.UNSET,
         )

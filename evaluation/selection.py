@@ -70,7 +70,7 @@ def _shipped(request: "EvaluationRequest", named: list[ReachProblem]) -> list[Co
         name
         for name, problem in PROBLEMS.items()
         if (changed := _changed(request, problem)).arm_digest == problem.arm_digest
-        and (not named or any(map(changed.covers, named)))
+        and (not named or any(changed.tested_as(each).covers(each) for each in named))
     }
     shipped = [
         contestant

@@ -86,7 +86,7 @@ class Step:
         if self.before is not None and self.after is not None:
             ways = np.linalg.norm(self.after[:, 13:] - self.before[:, 13:], axis=1)
             others = shapes.pairs[:, 2] - (len(shapes.capsules) - len(ways))
-            motion += np.where(others < 0, 0.0, ways[others])
+            motion += np.where(others < 0, 0.0, ways[np.maximum(others, 0)])
         return motion
 
 

@@ -11,6 +11,9 @@ from kinarm.kernels.compiling import Array
 from kinarm.observation import GOAL_SIDE
 from kinarm.task import REWARD_TERMS
 
+INTERVALS = 16
+"""Parts of a step that is tested throughout."""
+
 RUNNING, PAUSED, SUCCESS, COLLISION, TRUNCATED = range(5)
 """States of an episode."""
 
@@ -29,7 +32,8 @@ class Rules(NamedTuple):
     step_limit : ndarray, shape (n_actuated,)
         Largest move of each joint in a step [rad or m].
     tested : int
-        Configurations of a step that are tested for contact.
+        Configurations of a step that are tested for contact; 0 for all of its
+        motion.
     tolerance, horizon
         Distance at which a goal is reached [m], and largest number of steps.
     reward : ndarray, shape (n_terms,)
@@ -45,6 +49,11 @@ class Rules(NamedTuple):
     horizon: int
     reward: Array
     moves: Array
+
+    @property
+    def parts(self) -> int:
+        """Parts of a step, at whose ends it is looked at first."""
+        return self.tested or INTERVALS
 
 
 class Control(NamedTuple):

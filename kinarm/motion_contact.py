@@ -11,8 +11,8 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from kinarm.collision import Contact, ContactModel, Step
+from kinarm.episodes import INTERVALS
 from kinarm.kernels.compiling import Array
-from kinarm.kernels.proof import INTERVALS
 
 TOUCHING, TOLD_APART = 1e-6, 2.5e-7
 """Distance at which bodies touch, and motion in half an interval that is not halved [m]."""

@@ -196,6 +196,10 @@ class ReachProblem(Checked):
         """Whether another problem has the same arm and scene."""
         return self.arm_digest == other.arm_digest and self.scene == other.scene
 
+    def tested_as(self, other: "ReachProblem") -> "ReachProblem":
+        """The same problem, whose steps are tested for contact as another's are."""
+        return self.replace(tested_configurations=other.stepping.tested_configurations)
+
     def covers(self, other: "ReachProblem") -> bool:
         """Whether this is the other problem with any goal weights and further regions."""
         wider = set(self.task.goal_regions) >= set(other.task.goal_regions)

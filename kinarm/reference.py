@@ -54,9 +54,7 @@ class ReferenceSimulator:
         self.arm: Arm = simulator.arm
         self.task = simulator.task
         self.step_limit = simulator.step_limit
-        stepping = simulator.problem.stepping
-        motion = stepping.contact == "motion"
-        self.tested = SAMPLES if motion else stepping.tested_configurations
+        self.tested = simulator.world.rules.tested or SAMPLES
         self._data = self.arm.model.createData()
         self._world, self._problem = simulator.world, simulator.problem
         self._begin(simulator.world.contact_model)

@@ -114,10 +114,10 @@ class StepContact:
         return contact.pair if contact else None
 
     def substeps(self, configurations: Array, targets: Array) -> Array:
-        """Configurations at which the motion of a step is tested for contact.
+        """Configurations at which a step is tested for contact, or between which all of it is.
 
         Takes ends of steps, shape (n, n_joints), and returns evenly spaced configurations, shape
-        (n, n_tested, n_joints), of which the last is the target [rad or m]; likewise for rows of
+        (n, n_parts, n_joints), of which the last is the target [rad or m]; likewise for rows of
         bodies.
         """
         shares = self._shares.reshape(-1, *[1] * (targets.ndim - 1))
@@ -128,6 +128,5 @@ class StepContact:
     @property
     def _shares(self) -> Array:
         """Shares of a step at which it is tested."""
-        n_tested = self.problem.stepping.tested_configurations
-        shares: Array = np.arange(1, n_tested + 1) / n_tested
+        shares: Array = np.arange(1, self.rules.parts + 1) / self.rules.parts
         return shares

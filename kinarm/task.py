@@ -4,13 +4,13 @@ Numbers out of range are an `InvalidInputError`, what does not match is a `Probl
 """
 
 from dataclasses import dataclass, field, fields
-from typing import Literal, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from kinarm._fields import OPTIONAL, Checked
-from kinarm.errors import POSITIVE, SHARE, ProblemError
+from kinarm.errors import FROM_ZERO, POSITIVE, SHARE, ProblemError
 from kinarm.scene import Scene
 
 LONGEST_HORIZON = 1_000_000
@@ -169,14 +169,8 @@ class Stepping(Checked):
         Duration of a step [s].
     tested_configurations : int
         Evenly spaced configurations, from 1 to 32, at which the motion of a
-        step is tested for contact, its end included.
-    contact : {"configurations", "motion"}
-        Whether a step touches something at these configurations, or at any time
-        of its motion.
+        step is tested for contact, its end included; 0 for all of the motion.
     """
 
     time_step: float = field(default=0.02, metadata=POSITIVE)
-    tested_configurations: int = field(default=4, metadata={"at_most": 32})
-    contact: Literal["configurations", "motion"] = field(
-        default="configurations", metadata=OPTIONAL
-    )
+    tested_configurations: int = field(default=0, metadata={**FROM_ZERO, "at_most": 32})

@@ -76,10 +76,9 @@ class World(InverseKinematics, StepContact):
         self.contact_model = ContactModel.build(self.arm, self.problem.scene)
         self.starts = self._checked_starts()
         task, stepping = self.problem.task, self.problem.stepping
-        n_tested = stepping.tested_configurations
         self.rules = Rules(
             step_limit=self.arm.velocity_limits[: self.arm.n_actuated] * stepping.time_step,
-            tested=0 if stepping.contact == "motion" else n_tested,
+            tested=stepping.tested_configurations,
             tolerance=float(task.tolerance),
             horizon=int(task.horizon),
             reward=task.reward.vector,

@@ -267,9 +267,12 @@ def mesh_arm(tmp_path_factory: pytest.TempPathFactory) -> Arm:
 def simulators(
     shipped_arms: dict[str, Arm], sliding_arm: Arm, mesh_arm: Arm
 ) -> dict[str, Simulator]:
-    """One single-threaded simulator per arm, problem ``both``, and one of bodies of all shapes."""
+    """One single-threaded simulator per arm, problem ``both``, and one of bodies of all shapes.
+
+    Steps are tested at four configurations, as the reference can be quickly and to the bit.
+    """
     arms = {**shipped_arms, "sliding": sliding_arm, "mesh": mesh_arm}
-    both = ReachProblem.load("both")
+    both = ReachProblem.load("both").replace(tested_configurations=4)
     problems = {name: both.replace(arm=arm) for name, arm in arms.items()}
     problems["bodies"] = both.replace(scene=random_scene(3, 7, largest=0.25))
     return {name: Simulator(problem, threads=1) for name, problem in problems.items()}

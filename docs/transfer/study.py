@@ -22,7 +22,10 @@ from kinarm.problem import PROBLEMS, ReachProblem
 FIRST_SEEDS = {"source": 0, "scratch": 1000, "warm": 2000}
 """Training seeds by role: no two trainings of a learner on a task share random numbers."""
 
-SOURCE = PROBLEMS["left"]
+TESTED = {"tested_configurations": 4}
+"""How steps are tested for contact, as when it was recorded."""
+
+SOURCE = PROBLEMS["left"].replace(**TESTED)
 """The paper's task 1."""
 
 OTHER_ARM = "lrmate200ic_5l"
@@ -32,7 +35,7 @@ OTHER_ARM = "lrmate200ic_5l"
 def targets() -> tuple[ReachProblem, ...]:
     """The paper's tasks 2 and 3, and task 1 of another arm."""
     other = SOURCE.replace(name=f"{SOURCE.name}-{OTHER_ARM}", arm=OTHER_ARM)
-    return PROBLEMS["right"], PROBLEMS["both"], other
+    return PROBLEMS["right"].replace(**TESTED), PROBLEMS["both"].replace(**TESTED), other
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -112,7 +115,11 @@ class TransferStudy:
 
     def _experiment(self, name: str, entries: list[Entry]) -> Experiment:
         return Experiment(
-            name=name, entries=tuple(entries), trials=self.protocol.settings, bounds=False
+            name=name,
+            entries=tuple(entries),
+            trials=self.protocol.settings,
+            bounds=False,
+            fixed={f"problem.stepping.{field}": value for field, value in TESTED.items()},
         )
 
     def _sources(self) -> Experiment:

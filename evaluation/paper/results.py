@@ -200,7 +200,7 @@ class PaperResults:
         Under one reading, the paper's tasks are crossed: each trial has the same start, and its
         goal at the same place of the left or right bench.
         """
-        problem = PROBLEMS[task].replace(start_spread=reading.start_spread)
+        problem = self.select("ars", task, reading)[0].planned.config.problem
         return trial_set(problem, self.experiment.trials.count, self.experiment.trials.seed)
 
 

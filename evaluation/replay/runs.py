@@ -65,7 +65,7 @@ def record(
             "policy": made,
             "versions": package_versions(),
             "commit": source_commit(),
-            **({"note": contestant.note} if contestant.note else {}),
+            **({"note": note} if (note := contestant.note_on(trials.problem)) else {}),
         },
     )
 

@@ -10,6 +10,7 @@ nothing, a better plane is taken, and then each configuration or interval betwee
 
 from kinarm.chain import Chain
 from kinarm.contact_shapes import PLANE, WITH_HALFSPACE, ContactShapes
+from kinarm.episodes import INTERVALS
 from kinarm.kernels.compiling import Array, helper, inlined
 from kinarm.kernels.lanes import any_lane, as_numbers, lane_bits, select
 from kinarm.kernels.overlap import overlap
@@ -21,9 +22,6 @@ MARGIN = 2e-6
 
 Coal calls contact what is up to 1e-6 m apart, and some 1e-9 m more.
 """
-
-INTERVALS = 16
-"""Parts of a step that is tested throughout."""
 
 SURE_CONTACT, SURE_FREEDOM = 0.99e-6, 1.25e-6
 """Distances that are contact, and freedom, in such a step, where Coal need not agree [m]."""

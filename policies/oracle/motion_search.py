@@ -113,7 +113,8 @@ class MotionSearch:
                 return
             steps = np.full(rows.size, self.simulator.task.horizon)
             solutions = self._try_straight(rows, steps, distances + nearer, SAMPLES[-1])
-            self._try_vias(rows, steps, solutions, np.flatnonzero(np.isinf(self.costs[rows])))
+            due = np.isinf(self.costs[rows]) & (steps > 1)
+            self._try_vias(rows, steps, solutions, np.flatnonzero(due))
 
     def _try_straight(
         self, rows: NDArray[np.int64], steps: NDArray[np.int64], tolerances: Array, samples: int
@@ -302,8 +303,8 @@ def _extend(simulator: Simulator, tree: Tree, sample: Array, longest: float) -> 
 
 def _straight_way(simulator: Simulator, first: Array, second: Array) -> tuple[Array, int]:
     """Configurations on the way, and how many in a row touch nothing."""
-    tested_each = simulator.problem.stepping.tested_configurations
-    count = max(1, int(np.ceil(tested_each * steps_between(simulator, first, second))))
+    parts = simulator.world.rules.parts
+    count = max(1, int(np.ceil(parts * steps_between(simulator, first, second))))
     tested = first + np.arange(1, count + 1)[:, None] / count * (second - first)
     tested[-1] = second
     _, touching = simulator.world.screen(tested)

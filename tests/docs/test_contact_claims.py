@@ -29,7 +29,7 @@ def test_it_goes_on_where_it_ended(tmp_path, monkeypatch):
 @pytest.mark.parametrize("part", ["configurations", "episodes", "steps"])
 def test_it_finds_what_is_wrong(part, monkeypatch):
     """A Coal that sees nothing, or steps that are tested at four configurations alone."""
-    few = changed(contact_claims.before_plate("paper"), contact="configurations")
+    few = changed(contact_claims.before_plate("paper"), tested_configurations=4)
     assert contact_claims.check((part, "paper", 0, 100))[2] == []
     monkeypatch.setattr(ContactModel, "in_contact", lambda _, q: np.zeros(len(q), bool))
     monkeypatch.setattr(ReferenceSimulator, "first_contact", lambda *_: None)

@@ -8,6 +8,7 @@ import pytest
 from kinarm.errors import InvalidInputError, PolicyFileError
 from kinarm.evaluation.bounds import oracle_bounds
 from kinarm.evaluation.contestants import ORACLE, UNTRAINED, Contestant
+from kinarm.evaluation.evaluation import evaluate
 from kinarm.evaluation.finding import find_contestants
 from kinarm.evaluation.selection import check_names
 from kinarm.evaluation.trials import TrialSet
@@ -67,6 +68,27 @@ def test_a_symmetric_policy_is_also_for_a_part_of_its_goals(skilled):
     assert served(Contestant.from_policy("of both", symmetric)) == ["left", "right", "both"]
     assert served(Contestant.from_policy("of one", skilled)) == ["right"]
     assert served(Contestant.from_policy("plain", replace(symmetric, mirror=None))) == ["both"]
+
+
+def test_how_steps_are_tested_for_contact_is_no_other_problem(skilled):
+    """A policy of one of the paper's problems faces it as it is now; a note tells of training."""
+    right = PROBLEMS["right"]
+    made = {
+        problem: replace(skilled.provenance, problem=problem.pinned)
+        for problem in (right.replace(tested_configurations=4), right.replace(horizon=9))
+    }
+    four, own = (
+        Contestant.from_policy("mine", replace(skilled, mirror=mirror, provenance=each))
+        for each, mirror in zip(made.values(), (None, skilled.mirror), strict=True)
+    )
+    assert four.problem is right
+    assert own.problem == own.policy.problem
+    assert served(four) == served(four, tested_configurations=7) == ["right"]
+    assert evaluate(four, trials=2).problem == right
+    told = "training tested steps for contact at 4 configurations"
+    assert four.note_on(right) == evaluate(four, trials=2).result.note == told
+    assert four.note_on(four.policy.problem) == own.note_on(right) == ""
+    assert own.note_on(four.policy.problem) == "training tested steps for contact throughout"
 
 
 def test_names_have_to_tell_contestants_and_problems_apart(skilled):

@@ -71,8 +71,9 @@ def test_protocol_tells_how_it_was_done(document, evaluations):
         assert ReachProblem.from_json(entry["problem"]) == problem.pinned
 
 
-def test_listed_trials_can_be_simulated_again(document, skilled):
+def test_listed_trials_can_be_simulated_again(document, skilled, monkeypatch):
     """By the reference path, from nothing but the numbers in the document."""
+    monkeypatch.setattr("kinarm.reference.SAMPLES", 60)
     entry, row = document["protocol"]["problems"]["right"], document["results"][1]
     reference = ReferenceSimulator(Simulator(ReachProblem.from_json(entry["problem"])))
     for i in range(row["trials"]):

@@ -33,7 +33,8 @@ def test_public_names_are_what_they_say():
     assert answer.returncode == 0, answer.stderr
 
 
-def test_episodes_are_those_of_the_reference(skilled, skilled_evaluation):
+def test_episodes_are_those_of_the_reference(skilled, skilled_evaluation, monkeypatch):
+    monkeypatch.setattr("kinarm.reference.SAMPLES", 60)
     trials, rollouts = skilled_evaluation.trials, skilled_evaluation.rollouts
     reference = ReferenceSimulator(trials.simulator)
     for i in range(len(trials)):

@@ -14,6 +14,7 @@ import numpy as np
 from kinarm.envs import ReachVectorEnv
 from kinarm.policies.library import load_policy
 from kinarm.policies.oracle import Oracle
+from kinarm.problem import PROBLEMS
 from kinarm.simulator import Simulator
 
 REQUEST = bytes.fromhex(
@@ -45,12 +46,13 @@ def make_requests() -> Callable[[int, bytes], None]:
 def sections() -> dict[str, Callable[[], object]]:
     """Work by name."""
     policy = load_policy("ars-tuned-both-seed0")
-    simulator = Simulator("right", threads=1)
+    problem = PROBLEMS["right"].replace(tested_configurations=4)
+    simulator = Simulator(problem, threads=1)
     scenarios = simulator.sample(np.random.default_rng(0), 256)
-    env = ReachVectorEnv(64, "right", threads=1)
+    env = ReachVectorEnv(64, problem, threads=1)
     env.reset(seed=0)
     actions = np.random.default_rng(0).uniform(-1, 1, (32, 64, simulator.n_actions))
-    oracle = Oracle("right", threads=1)
+    oracle = Oracle(problem, threads=1)
     trials = simulator.sample(np.random.default_rng(3), 4)
 
     def step() -> None:

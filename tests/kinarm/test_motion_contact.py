@@ -29,8 +29,7 @@ def pen(make_joint, make_collision, write_robot):
     scene = Scene(obstacles=(plate,), goal_regions=Scene().goal_regions)
     problem = PROBLEMS["left"].replace(arm=arm, scene=scene)
     return [
-        Simulator(problem.replace(contact=contact), threads=1)
-        for contact in ("configurations", "motion")
+        Simulator(problem.replace(tested_configurations=tested), threads=1) for tested in (4, 0)
     ]
 
 
@@ -54,14 +53,13 @@ def test_a_pen_never_passes_a_thin_plate(pen):
 def test_outcomes_are_those_of_many_configurations(simulators, name, monkeypatch):
     """Hundreds of a step, which lie half a millimetre apart."""
     monkeypatch.setattr("kinarm.reference.SAMPLES", 300)
-    simulator = changed(simulators[name], contact="motion")
-    _, collisions, count = compare_actions(simulator, 13, 5)
+    _, collisions, count = compare_actions(simulators[name], 13, 5, tested=0)
     assert 0 < collisions <= count
 
 
 @pytest.mark.parametrize("name", ["paper", "mesh", "bodies"])
 def test_it_refuses_all_that_the_discrete_rule_refuses(simulators, name):
-    whole = changed(simulators[name], contact="motion")
+    whole = changed(simulators[name], tested_configurations=0)
     starts, goals = whole.sample(np.random.default_rng(1), 400)
     blocks = np.random.default_rng(2).uniform(-1, 1, (400, 8, whole.n_actions))
     actions = np.repeat(blocks, 8, axis=1)
@@ -113,7 +111,7 @@ def test_environments_name_what_was_touched_first(pen):
 def test_random_configurations_are_apart_or_touch_as_before(simulators):
     """What a configuration touches does not depend on how steps are tested."""
     q = random_configurations(simulators["paper"], 3, 2000)
-    whole = changed(simulators["paper"], contact="motion").world
+    whole = changed(simulators["paper"], tested_configurations=0).world
     np.testing.assert_array_equal(whole.in_contact(q), simulators["paper"].world.in_contact(q))
 
 

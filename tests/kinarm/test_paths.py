@@ -61,7 +61,7 @@ def test_is_what_the_simulator_does(simulator):
 
 
 def test_ends_where_it_touches(simulator):
-    recording = record_path("both", [np.zeros(6), BELOW, np.zeros(6)], name="mine")
+    recording = record_path(simulator.problem, [np.zeros(6), BELOW, np.zeros(6)], name="mine")
     assert recording.outcome == "collision"
     assert recording.policy == "mine"
     assert "ground" in recording.contact
@@ -73,7 +73,7 @@ def test_ends_where_it_touches(simulator):
 
 def test_replay_in_one_call(simulator, tmp_path):
     path = [np.zeros(6), BELOW]
-    page = replay_path("both", path, tmp_path / "path.html")
+    page = replay_path(simulator.problem, path, tmp_path / "path.html")
     assert (tmp_path / "path.html").read_text(encoding="utf-8") == page.html
     recording = record_path(simulator.world, path)
     assert replay_page(recording).html == page.html

@@ -21,7 +21,8 @@ REWARD = RewardWeights(progress=1.5, closer=0.03, collision=-0.7, success=0.4, s
 
 def simulator_of(problem="right", **overrides):
     """A simulator in which each reward term counts."""
-    return Simulator(ReachProblem.load(problem).replace(reward=REWARD, **overrides), threads=1)
+    made = ReachProblem.load(problem).replace(reward=REWARD, tested_configurations=4)
+    return Simulator(made.replace(**overrides), threads=1)
 
 
 def still(_):
@@ -160,8 +161,8 @@ def test_short_episodes_of_other_time_steps():
 @pytest.mark.parametrize("tested", [1, 5, 32])
 def test_other_numbers_of_tested_configurations(tested):
     """Steps are long, so that the number matters."""
-    simulator = simulator_of(horizon=12, time_step=0.08, tested_configurations=tested)
-    _, collision, count = compare_actions(simulator, 12, 150, held=3)
+    simulator = simulator_of(horizon=12, time_step=0.08)
+    _, collision, count = compare_actions(simulator, 12, 150, held=3, tested=tested)
     assert 10 < collision < count - 10
 
 

@@ -26,7 +26,7 @@ from kinarm.problem import PROBLEMS
 from kinarm.reference import ReferenceSimulator
 from kinarm.task import RewardWeights
 
-SHORT = PROBLEMS["right"].replace(horizon=8)
+SHORT = PROBLEMS["right"].replace(horizon=8, tested_configurations=4)
 TINY = ARSConfig(problem=SHORT, directions=4, top_directions=2, iterations=6, seed=5)
 
 

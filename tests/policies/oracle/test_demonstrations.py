@@ -6,6 +6,7 @@ import sys
 import numpy as np
 import pytest
 from reference_episodes import scripted
+from simulators import changed
 
 from kinarm.envs import ReachEnv
 from kinarm.errors import InvalidInputError, OutputError, RecordingFileError
@@ -48,7 +49,7 @@ def assert_same(first, second):
 
 
 def test_motions_reach_their_goals_in_the_reference(oracle, shown):
-    reference = ReferenceSimulator(oracle.simulator)
+    reference = ReferenceSimulator(changed(oracle.simulator, tested_configurations=4))
     for number, (rows, start, goal) in enumerate(motions(shown)):
         episode = reference.rollout(scripted(shown.actions[rows]), start, goal)
         assert episode.success
