@@ -164,7 +164,9 @@ def _value(hint: Any, entry: Any, where: str, path: str, kind: type) -> Any:
         # Of several kinds of tables, the one with most of these keys.
         fitting = max(tables, key=lambda table: len(entry.keys() & init_fields(table)))
         return from_plain(fitting, entry, where, f"{path}.")
-    hint = choices[0]
+    listed = isinstance(entry, list | tuple)
+    # Of a number or a list, what it looks like.
+    hint = next((each for each in choices if (get_origin(each) is tuple) == listed), choices[0])
     origin, arguments = get_origin(hint), get_args(hint)
     if origin is tuple and isinstance(entry, list | tuple):
         each = arguments[:1] * len(entry) if arguments[-1] is Ellipsis else arguments

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pinocchio as pin
+from numpy.typing import NDArray
 
 from kinarm._parallel import run_rows
 from kinarm.arm import Arm
@@ -14,6 +15,12 @@ from kinarm.kernels.compiling import Array
 from kinarm.kernels.placing import ATTEMPTS, draw_scenes
 from kinarm.scene import Scene
 from kinarm.scene_draws import SceneDraws
+
+
+def bits_of(starts: Array, goals: Array) -> NDArray[np.uint64]:
+    """Bits of goals and starts, shape (n, 3 + n_joints), which decide what an episode draws."""
+    bits: NDArray[np.uint64] = (np.concatenate([goals, starts], axis=1) + 0.0).view(np.uint64)
+    return bits
 
 
 def drawn_rows(
@@ -37,8 +44,8 @@ def drawn_rows(
     """
     n = len(starts)
     scenes, failed = np.empty((n, *draws.placed.shape)), np.empty(n, dtype=np.int64)
-    bits = (np.concatenate([goals, starts], axis=1) + 0.0).view(np.uint64)
-    run_rows(draw_scenes, n, n, threads, chain, draws, starts, goals, bits, scenes, failed)
+    arrays = starts, goals, bits_of(starts, goals), scenes, failed
+    run_rows(draw_scenes, n, n, threads, chain, draws, *arrays)
     if failed.any():
         name = scene.random_bodies[int(failed.max()) - 1].name
         raise ProblemError(

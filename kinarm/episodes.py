@@ -41,6 +41,8 @@ class Rules(NamedTuple):
     moves : ndarray, shape (horizon + 1, n_moving, 3)
         Offsets of the scene's moving bodies after each step [m], between which
         they move straight.
+    time_step, commanded
+        Duration of a step [s]; and whether a plant feeds back its command.
     """
 
     step_limit: Array
@@ -49,6 +51,8 @@ class Rules(NamedTuple):
     horizon: int
     reward: Array
     moves: Array
+    time_step: float
+    commanded: int
 
     @property
     def parts(self) -> int:
@@ -110,6 +114,11 @@ class Episodes(NamedTuple):
     scenes : ndarray, shape (n, n_placed, 16) or (0, n_placed, 16)
         Rows in ``poses`` of each episode's bodies when it began, if they differ
         or move; see ``kinarm.contact_shapes``.
+    plant, drive : ndarray, shape (n, width) and (n, n_rows, n_actuated), or of no rows
+        Numbers of a plant that is not ideal, and its state; see
+        ``kinarm.kernels.plant``.
+    sensed : ndarray, shape (n, n_joints) or (0, n_joints)
+        Joint positions as such a plant measures them [rad or m].
     goal, distance : ndarray, shape (n, 3) and (n,)
         Goal position, and the tool's distance from it [m].
     observation : ndarray, shape (n, n_observations)
@@ -134,6 +143,9 @@ class Episodes(NamedTuple):
     cleared: NDArray[np.bool_]
     planes: Array
     scenes: Array
+    plant: Array
+    drive: Array
+    sensed: Array
     goal: Array
     observation: Array
     distance: Array

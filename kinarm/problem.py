@@ -16,11 +16,20 @@ import numpy as np
 import tomli_w
 from numpy.typing import NDArray
 
-from kinarm._fields import Checked, from_plain, init_fields, read_toml, take_base, to_plain
+from kinarm._fields import (
+    OPTIONAL,
+    Checked,
+    from_plain,
+    init_fields,
+    read_toml,
+    take_base,
+    to_plain,
+)
 from kinarm._files import absolute, is_file, named_file, shipped_files, write_text
 from kinarm.arm_specification import ArmSpecification
 from kinarm.bodies import read_meshes
 from kinarm.errors import InvalidInputError, ProblemError, UnknownNameError
+from kinarm.plant import Plant
 from kinarm.scene import Scene
 from kinarm.task import ReachTask, RewardWeights, Stepping
 
@@ -32,7 +41,7 @@ Part = TypeVar("Part", Scene, ReachTask)
 PAPER_TASKS = {"left": ("left",), "right": ("right",), "both": ("left", "right")}
 """Goal regions of the paper's tasks 1, 2 and 3 by problem."""
 
-KEYS = {"base", "name", "arm", "scene", "task", "stepping"}
+KEYS = {"base", "name", "arm", "scene", "task", "stepping", "plant"}
 """Keys of a problem file."""
 
 
@@ -52,6 +61,8 @@ class ReachProblem(Checked):
         Goals, endings, starts and rewards.
     stepping : Stepping
         How time passes.
+    plant : Plant
+        What lies between a command and the joints.
     """
 
     name: str
@@ -59,6 +70,7 @@ class ReachProblem(Checked):
     scene: Scene = field(default_factory=Scene)
     task: ReachTask
     stepping: Stepping = field(default_factory=Stepping)
+    plant: Plant = field(default_factory=Plant, metadata=OPTIONAL)
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -107,11 +119,11 @@ class ReachProblem(Checked):
         **overrides
             ``name``; ``arm`` (a name, a path or a specification), ``scene`` and
             ``task`` (by name, of a file, of another problem, or themselves),
-            ``stepping``; ``reward`` (weights, or a mapping of those that
-            change); or any field of the task or the stepping, such as
-            ``tolerance``. None changes nothing. With another scene, by name or
-            file, that lacks a goal region of the task, all its regions are to
-            be reached.
+            ``stepping``; ``plant`` (by name, of a file, or itself); ``reward``
+            (weights, or a mapping of those that change); or any field of task,
+            stepping or plant, such as ``tolerance``. None changes nothing. With
+            another scene, by name or file, that lacks a goal region of the task,
+            all its regions are to be reached.
         """
         given = {name: value for name, value in overrides.items() if value is not None}
         if not given:
@@ -119,10 +131,10 @@ class ReachProblem(Checked):
         changes = _taken(given, ReachProblem)
         if "arm" in changes:
             changes["arm"] = _specification(changes["arm"])
-        for name, find in (("scene", find_scene), ("task", find_task)):
+        for name, find in (("scene", find_scene), ("task", find_task), ("plant", Plant.load)):
             if isinstance(changes.get(name), str | Path):
                 changes[name] = find(changes[name])
-        task, stepping = changes.get("task", self.task), changes.get("stepping", self.stepping)
+        task = changes.get("task", self.task)
         if isinstance(overrides.get("scene"), str | Path) and "task" not in changes:
             regions = {region.name for region in changes["scene"].goal_regions}
             if not regions.issuperset(task.goal_regions):
@@ -131,12 +143,11 @@ class ReachProblem(Checked):
             weights = dict(given["reward"])
             _check_names("reward term", weights, RewardWeights)
             given["reward"] = replace(task.reward, **weights)
-        of_task, of_stepping = _taken(given, ReachTask), _taken(given, Stepping)
-        _check_names("setting of a problem", given, ReachProblem, ReachTask, Stepping)
-        if of_task:
-            changes["task"] = replace(task, **of_task)
-        if of_stepping:
-            changes["stepping"] = replace(stepping, **of_stepping)
+        for part, whole in (("task", task), ("stepping", self.stepping), ("plant", self.plant)):
+            whole = changes.get(part, whole)
+            if own := _taken(given, type(whole)):
+                changes[part] = replace(whole, **own)
+        _check_names("setting of a problem", given, ReachProblem, ReachTask, Stepping, Plant)
         return replace(self, **changes)
 
     def body_offsets(self, taken: NDArray[np.int64]) -> NDArray[np.float64]:
@@ -298,6 +309,8 @@ def read_problem(path: Path) -> dict[str, Any]:
     else:
         read_meshes(scene, path)
     read_meshes(entries.get("arm"), path)
+    if isinstance(entries.get("plant"), str):
+        entries["plant"] = to_plain(Plant.load(_beside(path, entries["plant"])))
     if isinstance(task, str):
         entries["task"] = to_plain(find_task(_beside(path, task)))
     elif isinstance(task, Mapping):

@@ -3,10 +3,11 @@
 import sys
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, ClassVar
+from typing import TYPE_CHECKING, ClassVar, Literal
 
 from kinarm._fields import Checked, init_fields
 from kinarm.arm_specification import arm_names
+from kinarm.plant import plant_names
 from kinarm.problem import ProblemLike, ReachProblem, problem_names, scene_names
 
 if TYPE_CHECKING:
@@ -31,6 +32,10 @@ class ProblemOptions(Checked):
         The task of another problem, by its name or file.
     scene : str
         Another scene, by its name or that of a problem, or a file.
+    plant : str
+        What lies between commands and joints, by name or file.
+    feedback : {"measured", "commanded"}
+        Which joint positions are seen.
     tolerance : float
         Distance at which a goal counts as reached [m].
     horizon : int
@@ -47,11 +52,15 @@ class ProblemOptions(Checked):
     )
     task: str | None = None
     scene: str | None = field(default=None, metadata={"names": scene_names})
+    plant: str | None = field(default=None, metadata={"names": plant_names})
+    feedback: Literal["measured", "commanded"] | None = None
     tolerance: float | None = None
     horizon: int | None = None
     start_spread: float | None = None
 
-    CHANGES: ClassVar = "arm tool_frame package_dirs task scene tolerance horizon start_spread"
+    CHANGES: ClassVar = (
+        "arm tool_frame package_dirs task scene plant feedback tolerance horizon start_spread"
+    )
     """Fields that change a problem."""
 
     GROUPS: ClassVar[Mapping[str, str]] = {"problem": f"problem {CHANGES}"}
@@ -59,7 +68,8 @@ class ProblemOptions(Checked):
 
     DEFAULTS: ClassVar[Mapping[str, str]] = {
         **dict.fromkeys(
-            ("arm", "task", "scene", "tolerance", "horizon", "start_spread"), "the problem's"
+            ("arm", "task", "scene", "plant", "feedback", "tolerance", "horizon", "start_spread"),
+            "the problem's",
         ),
         "tool_frame": "the arm's",
     }

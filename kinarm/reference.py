@@ -15,6 +15,7 @@ from kinarm.arm import Arm
 from kinarm.collision import ContactModel
 from kinarm.contact_pairs import make_verdicts_reliable, start_anew
 from kinarm.kernels.compiling import Array
+from kinarm.reference_plant import ReferencePlant
 from kinarm.simulator import Simulator
 
 
@@ -53,7 +54,6 @@ class ReferenceSimulator:
     def __init__(self, simulator: Simulator) -> None:
         self.arm: Arm = simulator.arm
         self.task = simulator.task
-        self.step_limit = simulator.step_limit
         self.tested = simulator.world.rules.tested or SAMPLES
         self._data = self.arm.model.createData()
         self._world, self._problem = simulator.world, simulator.problem
@@ -76,20 +76,21 @@ class ReferenceSimulator:
         begun = self.contact_model.shapes.placed[list(self._problem.scene.moving), 13:]
         positions = begun + self._problem.body_offsets(np.arange(self.task.horizon + 1))
         q, reward = np.array(start), self.task.reward
-        observation, distance = self.observe(q, goal)
+        joints = ReferencePlant(self._world, q, goal)
+        distance = self.observe(q, goal)[1]
+        observation = self.observe(*joints.seen(q, 0))[0]
         path, observations = [q], [observation]
         rewards: list[float] = []
         success, contact = False, None
         while not success and contact is None and len(rewards) < self.task.horizon:
             action = np.clip(np.asarray(policy(observation), dtype=float), -1.0, 1.0)
-            target = q.copy()
-            target[: self.step_limit.size] += action * self.step_limit
-            target = np.clip(target, self.arm.lower, self.arm.upper)
+            target = joints.moved(q, action)
             contact = self.first_contact(q, target, *positions[len(rewards) :][:2])
             before = distance
             if contact is None:
                 q = target
-                observation, distance = self.observe(q, goal)
+                distance = self.observe(q, goal)[1]
+                observation = self.observe(*joints.seen(q, len(rewards) + 1))[0]
                 success = distance <= self.task.tolerance
             rewards.append(
                 reward.progress * (before - distance)

@@ -16,6 +16,7 @@ from kinarm.kernels.compiling import Array
 from kinarm.kernels.rollout import advance, allow_one_step, begin, refuse, results_of_step
 from kinarm.kernels.session import Session
 from kinarm.networks import CompiledPolicy, Networks, PolicyFunction, network_control, takes_rows
+from kinarm.plant import PlantLike
 from kinarm.problem import ProblemLike, ReachProblem
 from kinarm.scenarios import draw_scenarios
 from kinarm.scene import Scene
@@ -112,6 +113,12 @@ class Simulator:
         other.world = self.world.in_scene(start, goal)
         return other
 
+    def with_plant(self, plant: PlantLike) -> "Simulator":
+        """Another simulator of the same world with another plant, itself, its name or file."""
+        other = copy(self)
+        other.world = self.world.with_plant(plant)
+        return other
+
     def without_moving_bodies(self) -> "Simulator":
         """The same simulator without the bodies that move."""
         other = copy(self)
@@ -138,6 +145,7 @@ class Simulator:
         record: bool = False,
         origins: Array | None = None,
         taken: NDArray[np.int64] | int = 0,
+        drive: Array | None = None,
     ) -> Episodes:
         """Begin a batch of episodes, to be driven by `step`.
 
@@ -152,10 +160,12 @@ class Simulator:
             random bodies stay.
         taken : ndarray of int, shape (n,), or int
             Steps that they have taken before.
+        drive : ndarray, shape (n, n_rows, n_actions), optional
+            States of their plants; by default the arms rest.
         """
         episodes = self.world.episodes(*self.world.check_scenarios(starts, goals), record=record)
         episodes.steps[:] = taken
-        self._start(np.arange(len(episodes.steps)), self._stepped(episodes), origins)
+        self._start(np.arange(len(episodes.steps)), self._stepped(episodes), origins, drive)
         return episodes
 
     def step(self, episodes: Episodes, actions: ArrayLike) -> StepResult:
@@ -270,12 +280,23 @@ class Simulator:
         return session.episodes
 
     def _start(
-        self, rows: NDArray[np.int64], session: Session, origins: Array | None = None
+        self,
+        rows: NDArray[np.int64],
+        session: Session,
+        origins: Array | None = None,
+        drive: Array | None = None,
     ) -> None:
         """Start some episodes in their scenes; Coal decides about doubtful starts."""
         episodes, contacts = session.episodes, self.world.contact_model
+        begun = episodes.q[rows] if origins is None else origins
+        if self.world.plants.width:
+            plants = self.world.plants.of(begun, episodes.goal[rows], self.threads)
+            rests = drive is None or not len(drive)
+            episodes.plant[rows] = plants
+            episodes.drive[rows] = (
+                self.world.plants.at_rest(plants, episodes.q[rows]) if rests else drive
+            )
         if self.world.has_random_bodies:
-            begun = episodes.q[rows] if origins is None else origins
             episodes.scenes[rows] = self.world.scenes_of(begun, episodes.goal[rows])
         if not run_together(begin, len(rows), self.threads, session.of_thread, rows):
             return

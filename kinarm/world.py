@@ -14,6 +14,7 @@ from kinarm.chain import Chain, within_limits
 from kinarm.clearance import Clearance, flattened, measure_clearance
 from kinarm.collision import ContactModel
 from kinarm.contact_shapes import PLANE, ContactShapes
+from kinarm.episode_plants import EpisodePlants
 from kinarm.episode_scenes import drawn_rows
 from kinarm.episodes import Control, Episodes, Rules
 from kinarm.errors import (
@@ -32,6 +33,7 @@ from kinarm.kernels.rollout import begin
 from kinarm.kernels.screening import screen
 from kinarm.kernels.session import Alone, Block, Session, furnish, work_space
 from kinarm.observation import observation_size
+from kinarm.plant import PlantLike
 from kinarm.problem import ProblemLike, ReachProblem
 from kinarm.scene_draws import SceneDraws
 from kinarm.step_contact import StepContact
@@ -58,6 +60,8 @@ class World(InverseKinematics, StepContact):
         The task's starts [rad or m]; empty if it has none.
     rules : Rules
         Task and motion limits for the kernels.
+    plants : EpisodePlants
+        Draws the plants of episodes.
     has_random_bodies : bool
         Whether each episode has a scene of its own.
 
@@ -83,7 +87,10 @@ class World(InverseKinematics, StepContact):
             horizon=int(task.horizon),
             reward=task.reward.vector,
             moves=self.problem.body_offsets(np.arange(task.horizon + 1)),
+            time_step=stepping.time_step,
+            commanded=int(self.problem.plant.feedback == "commanded"),
         )
+        self.plants = EpisodePlants(self.problem, self.rules.step_limit)
         self.has_random_bodies = bool(self.problem.scene.random_bodies)
         self._idle: list[tuple[Block, Alone]] = []
 
@@ -107,6 +114,15 @@ class World(InverseKinematics, StepContact):
         other = copy(self)
         other.problem = self.problem.replace(tolerance=tolerance)
         other.rules = self.rules._replace(tolerance=float(tolerance))
+        return other
+
+    def with_plant(self, plant: PlantLike) -> "World":
+        """The same world with another plant, itself, its name or file."""
+        other = copy(self)
+        other.problem = self.problem.replace(plant=plant)
+        commanded = int(other.problem.plant.feedback == "commanded")
+        other.rules = self.rules._replace(commanded=commanded)
+        other.plants = EpisodePlants(other.problem, other.rules.step_limit)
         return other
 
     def __getstate__(self) -> dict[str, Any]:
@@ -290,6 +306,9 @@ class World(InverseKinematics, StepContact):
             cleared=np.zeros(n, dtype=bool),
             planes=np.zeros((n, len(shapes.pairs), PLANE)),
             scenes=np.tile(shapes.placed, (n if own_scenes else 0, 1, 1)),
+            plant=np.zeros((n if self.plants.width else 0, self.plants.width)),
+            drive=np.zeros((n if self.plants.width else 0, self.plants.rows, self.n_actions)),
+            sensed=starts.copy() if self.plants.width else starts[:0],
             goal=goals.copy(),
             observation=np.zeros((n, n_observations)),
             distance=np.zeros(n),

@@ -127,7 +127,9 @@ def rebuilt(kind: Any, name: str, arrays: Arrays) -> Any:
     """
     if is_dataclass(kind) or hasattr(kind, "_fields"):
         hints = get_type_hints(kind)
-        names = _field_names(kind)
+        # What has a default was not always written.
+        missing = [n for n in getattr(kind, "_field_defaults", ()) if f"{name}.{n}" not in arrays]
+        names = [each for each in _field_names(kind) if each not in missing]
         return kind(**{part: rebuilt(hints[part], f"{name}.{part}", arrays) for part in names})
     if get_origin(kind) is tuple:
         record = get_args(kind)[0]

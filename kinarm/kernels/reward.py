@@ -6,7 +6,7 @@ term is a field of `kinarm.task.RewardWeights` and a formula here, in the same o
 
 import math
 
-from kinarm.kernels.compiling import Array, inlined
+from kinarm.kernels.compiling import Array, Vector, inlined
 from kinarm.kernels.kinematics import to_world
 from kinarm.kernels.lanes import select
 from kinarm.observation import write_observation
@@ -52,5 +52,18 @@ def observe(tool: Array, poses: Array, goals: Array, row: int, observations: Arr
     """
     point = to_world(poses, poses.shape[0] - 1, tool[0], tool[1], tool[2])
     write_observation(poses, point, goals, row, observations, 0)
+    return distance_between(point, goals, row)
+
+
+@inlined
+def distance_to(tool: Array, poses: Array, goals: Array, row: int) -> float:
+    """Distance of the tool from a goal [m]."""
+    point = to_world(poses, poses.shape[0] - 1, tool[0], tool[1], tool[2])
+    return distance_between(point, goals, row)
+
+
+@inlined
+def distance_between(point: Vector, goals: Array, row: int) -> float:
+    """Distance of a point from a goal [m]."""
     dx, dy, dz = goals[row, 0] - point[0], goals[row, 1] - point[1], goals[row, 2] - point[2]
     return math.sqrt(dx * dx + dy * dy + dz * dz)

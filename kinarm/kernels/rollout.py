@@ -13,6 +13,7 @@ from kinarm.kernels.kinematics import forward_kinematics, place_bodies
 from kinarm.kernels.lanes import LANES, any_lane, as_numbers, lane_bits, select
 from kinarm.kernels.network import choose_actions, shared_policy
 from kinarm.kernels.planes import GAP
+from kinarm.kernels.plant import COMMAND, move_joints, rest, sense
 from kinarm.kernels.proof import (
     first_contact,
     is_apart,
@@ -21,7 +22,7 @@ from kinarm.kernels.proof import (
     prove_step,
     renew_planes,
 )
-from kinarm.kernels.reward import add_reward, observe
+from kinarm.kernels.reward import add_reward, distance_to, observe
 from kinarm.kernels.session import (
     Session,
     load_episode,
@@ -55,6 +56,10 @@ def begin(counters: NDArray[np.int64], session: Session, rows: NDArray[np.int64]
             e = rows[start + min(lane, filled - 1)]
             put(q, e, block.q, 0, lane)
             put(episodes.goal, e, block.goal, 0, lane)
+            if block.plant.shape[0] > 0:
+                put(episodes.plant, e, block.plant, 0, lane)
+                put(episodes.drive[e], COMMAND, block.drive, COMMAND, lane)
+                as_numbers(block.steps)[0, lane] = episodes.steps[e]
             put_scene(episodes.scenes, e, lane, block.after)
             if episodes.scenes.shape[0] > 0:
                 step = episodes.steps[e]
@@ -62,7 +67,12 @@ def begin(counters: NDArray[np.int64], session: Session, rows: NDArray[np.int64]
         forward_kinematics(chain, block.q, 0, block.after)
         free, _ = prove_configurations(shapes, 0, filled, block, alone)
         arm = block.after[: q.shape[1] + 1]
-        block.distance[0] = observe(chain.tool, arm, block.goal, 0, block.observation)
+        if block.plant.shape[0] > 0:
+            sense(chain, rules, block)
+            observe(chain.tool, block.seen_poses, block.seen_goal, 0, block.observation)
+            block.distance[0] = distance_to(chain.tool, arm, block.goal, 0)
+        else:
+            block.distance[0] = observe(chain.tool, arm, block.goal, 0, block.observation)
         # Store all that an episode begins with.
         for lane in range(filled):
             e = rows[start + lane]
@@ -74,6 +84,8 @@ def begin(counters: NDArray[np.int64], session: Session, rows: NDArray[np.int64]
             for term in range(episodes.terms.shape[1]):
                 episodes.terms[e, term] = 0.0
             take(block.observation, 0, lane, episodes.observation, e)
+            if block.plant.shape[0] > 0:
+                take(block.sensed, 0, lane, episodes.sensed, e)
             take_rows(block.planes, lane, episodes.planes[e])
             if path.shape[0] > 0:
                 take(block.q, 0, lane, path[e], 0)
@@ -117,10 +129,13 @@ def advance(counters: NDArray[np.int64], session: Session) -> int:
             centred = select(fresh, block.observation[0, i] - episodes.shift[i], 0.0)
             block.moments[0, i] += centred
             block.moments[1, i] += centred * centred
-        for axis in range(n_actuated):
-            moved = block.q[0, axis] + block.action[0, axis] * rules.step_limit[axis]
-            moved = min(max(moved, lower[axis]), upper[axis])
-            block.target[0, axis] = select(fresh, moved, block.target[0, axis])
+        if block.plant.shape[0] > 0:
+            move_joints(chain, rules, fresh, block)
+        else:
+            for axis in range(n_actuated):
+                moved = block.q[0, axis] + block.action[0, axis] * rules.step_limit[axis]
+                moved = min(max(moved, lower[axis]), upper[axis])
+                block.target[0, axis] = select(fresh, moved, block.target[0, axis])
         # Prove the steps free: together, then by new planes, then one by one.
         before, poses = poses, before
         forward_kinematics(chain, block.target, 0, poses)
@@ -165,13 +180,19 @@ def advance(counters: NDArray[np.int64], session: Session) -> int:
         changed = False
         block.cleared[0] = 0.0
         nearer = block.distance[0]
-        after = observe(tool, poses[: n_joints + 1], block.goal, 0, block.observation)
-        block.distance[0] = after
         block.steps[0] += 1.0
+        if block.plant.shape[0] == 0:
+            after = observe(tool, poses[: n_joints + 1], block.goal, 0, block.observation)
+        else:
+            after = distance_to(tool, poses[: n_joints + 1], block.goal, 0)
+        block.distance[0] = after
         reached, never = after <= rules.tolerance, after < 0.0
         add_reward(rules.reward, nearer, after, never, reached, block.terms, block.total, 0)
         for joint in range(n_joints):
             block.q[0, joint] = block.target[0, joint]
+        if block.plant.shape[0] > 0:
+            sense(chain, rules, block)
+            observe(tool, block.seen_poses, block.seen_goal, 0, block.observation)
         if episodes.path.shape[0] > 0:
             for lane in range(row.shape[0]):
                 if row[lane] >= 0:
@@ -250,6 +271,8 @@ def refuse_step(e: int, rules: Rules, episodes: Episodes) -> None:
     """End an episode whose step touches something; the arm stays."""
     episodes.status[e] = COLLISION
     episodes.steps[e] += 1
+    if episodes.drive.shape[0] > 0:
+        rest(e, episodes)
     distance = episodes.distance[e]
     add_reward(rules.reward, distance, distance, True, False, episodes.terms, episodes.total, e)
     if episodes.path.shape[0] > 0:

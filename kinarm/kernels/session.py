@@ -41,6 +41,8 @@ def layouts(
     widest: int = 0,
     own: int = 0,
     summed: int = 0,
+    plant: int = 0,
+    drive: int = 0,
 ) -> tuple[Layout, Layout]:
     """Layouts of a block and of a single episode's space.
 
@@ -55,7 +57,10 @@ def layouts(
         Parameters of an episode's own network.
     summed : int
         Summed entries of the observation, all or none.
+    plant, drive : int
+        Numbers of an episode's plant, and rows of its state; 0 if it is ideal.
     """
+    has_plant = Fixed(plant > 0)
     block = {
         # Configuration, target of the step [rad or m], and goal [m].
         "q": (ONE, n_joints),
@@ -64,6 +69,12 @@ def layouts(
         # Observation, and its mirror image for networks.
         "observation": (ONE, n_observations),
         "seen": (ONE, n_observations),
+        # Numbers and state of a plant; joint positions and goal as seen, and poses there.
+        "plant": (has_plant, plant),
+        "drive": (drive, n_actuated),
+        "sensed": (has_plant, n_joints),
+        "seen_goal": (has_plant, THREE),
+        "seen_poses": (has_plant * (n_joints + 1), Fixed(POSE)),
         # Poses before and after the step, which swap from step to step.
         **dict.fromkeys(("before", "after"), (n_joints + 1 + n_placed, Fixed(POSE))),
         # Separating plane of each pair, with its height; the last row is work space.
@@ -204,6 +215,11 @@ def load_episode(
     put(episodes.goal, e, block.goal, 0, lane)
     if control.layers.shape[0] > 0 or block.moments.shape[1] > 0:
         put(episodes.observation, e, block.observation, 0, lane)
+    if block.plant.shape[0] > 0:
+        put(episodes.plant, e, block.plant, 0, lane)
+        put(episodes.sensed, e, block.sensed, 0, lane)
+        for row in range(block.drive.shape[0]):
+            put(episodes.drive[e], row, block.drive, row, lane)
     for pair in range(episodes.planes.shape[1]):
         put(episodes.planes[e], pair, block.planes, pair, lane)
     if episodes.scenes.shape[0] > 0:
@@ -231,6 +247,9 @@ def store_episode(lane: int, e: int, episodes: Episodes, block: Block) -> None:
     if steps > episodes.steps[e]:
         take(block.observation, 0, lane, episodes.observation, e)
     take_rows(block.planes, lane, episodes.planes[e])
+    if block.plant.shape[0] > 0:
+        take(block.sensed, 0, lane, episodes.sensed, e)
+        take_rows(block.drive, lane, episodes.drive[e])
     take_rows(block.moments, lane, episodes.moments[e])
     take(block.terms, 0, lane, episodes.terms, e)
     episodes.distance[e] = as_numbers(block.distance)[0, lane]
@@ -277,6 +296,8 @@ class Session(Record):
             widest=max(self.control.layers.tolist()[1:], default=1),
             own=weights.shape[1] if weights.shape[0] > 1 else 0,
             summed=n_observations if len(self.episodes.moments) > 0 else 0,
+            plant=self.episodes.plant.shape[1],
+            drive=self.episodes.drive.shape[1],
         )
         furnish(shapes.values.placed, *space)
         parts = SessionFields(chain, shapes, rules, control, episodes, *space)

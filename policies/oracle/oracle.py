@@ -31,6 +31,7 @@ from kinarm.errors import (
     whole_number,
 )
 from kinarm.kernels.compiling import Array
+from kinarm.plant import Plant
 from kinarm.policies.oracle.bounding import Prover
 from kinarm.policies.oracle.demonstrations import Demonstrations
 from kinarm.policies.oracle.inverse import step_box
@@ -60,13 +61,14 @@ class Oracle:
     Parameters
     ----------
     problem : ReachProblem, str or Path
-        The problem, its name or its file; rewards do not matter.
+        The problem, its name or its file; rewards do not matter. Its plant is
+        taken for ideal, which reaches goals soonest.
     threads : int, optional
         Threads to use; by default as many as available processors.
     """
 
     def __init__(self, problem: ProblemLike, *, threads: int | None = None) -> None:
-        self.simulator = Simulator(problem, threads=threads)
+        self.simulator = Simulator(problem, threads=threads).with_plant(Plant())
         self._prover = Prover(self.simulator.without_moving_bodies())
 
     def __repr__(self) -> str:

@@ -239,6 +239,8 @@ class EpisodeStates(NamedTuple):
         Steps taken, and sums of rewards so far.
     replayed : ndarray of bool, shape (n,)
         Whether they began where an earlier one had failed.
+    drive : ndarray, shape (n, n_rows, n_actions), or empty
+        States of their plants.
     """
 
     q: NDArray[np.float64]
@@ -247,6 +249,7 @@ class EpisodeStates(NamedTuple):
     total: NDArray[np.float64]
     start: NDArray[np.float64]
     replayed: NDArray[np.bool_]
+    drive: NDArray[np.float64] = np.zeros((0, 0, 0))
 
     @classmethod
     def begun(cls, starts: NDArray[np.float64], goals: NDArray[np.float64]) -> "EpisodeStates":

@@ -73,7 +73,8 @@ class TrainingArms:
         self.reach_within(config.tolerance_at(done))
         begun = EpisodeStates._make(map(np.copy, state.episodes))
         scenarios, start, taken = (begun.q, begun.goal), begun.start, begun.steps
-        self.episodes = self.simulator.reset(*scenarios, origins=start, taken=taken)
+        going_on = {"origins": start, "taken": taken, "drive": begun.drive}
+        self.episodes = self.simulator.reset(*scenarios, **going_on)
         self._total, self._start, self._replayed = begun.total, begun.start, begun.replayed
         self.failed, self.time = state.failed, 0.0
         self.returns: list[NDArray[np.float64]] = []
@@ -84,7 +85,7 @@ class TrainingArms:
     def states(self) -> EpisodeStates:
         """Copy the state of running episodes."""
         episodes, ours = self.episodes, (self._total, self._start, self._replayed)
-        parts = (episodes.q, episodes.goal, episodes.steps, *ours)
+        parts = (episodes.q, episodes.goal, episodes.steps, *ours, episodes.drive)
         return EpisodeStates._make(map(np.copy, parts))
 
     def observe(self) -> Numbers:

@@ -1,0 +1,1 @@
+"""Plants, as TOML files."""

@@ -1,0 +1,228 @@
+"""Kernels of a plant: how an episode's is drawn, how commands move joints, and what is seen.
+
+A servo is stepped exactly, as a linear system with the state (q - command, velocity); limits hold
+in each of `SUBSTEPS` parts of a step.
+"""
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kinarm.chain import Chain
+from kinarm.episodes import Episodes, Rules
+from kinarm.kernels.compiling import Array, inlined, kernel
+from kinarm.kernels.elementary import exponential, nearest_whole, sine_cosine
+from kinarm.kernels.kinematics import forward_kinematics
+from kinarm.kernels.lanes import any_lane, as_numbers, select
+from kinarm.kernels.placing import FIRST, STEP, mixed, uniform
+from kinarm.kernels.session import Block
+from kinarm.plant import PlantDraws
+
+SUBSTEPS = 8
+"""Parts of a step in which limits of velocity, acceleration and jerk hold."""
+
+DELAY, RESOLUTION, NOISE, GOAL_NOISE, HIGH_BITS, LOW_BITS = range(6)
+SERVO, MOST_CHANGE, TRAPEZE, BRAKE, JERK, EASE = 6, 10, 11, 12, 13, 14
+OFFSETS = 15
+"""Entries of an episode's plant: delay [steps], resolution, standard deviations of noise, and the
+bits of its random state; the servo's matrix for a part of a step, most change of velocity in one,
+and how much of that change the part's way lacks. Of joints without servos, else 0: most change of
+a part's way, most change of the change of velocity, and what a limit of jerk takes off a part's way
+before a stop. Then follow bias and calibration of each joint, and the goal's bias."""
+
+COMMAND, VELOCITY, CHANGE, FORMER = range(4)
+"""Rows of an episode's drive: command, velocity, its change in the last part of a step, and former
+commands."""
+
+
+def plant_width(n_actuated: int) -> int:
+    """Entries of an episode's plant."""
+    return OFFSETS + 2 * n_actuated + 3
+
+
+@kernel
+def draw_plants(
+    first: int, last: int, draws: PlantDraws, bits: NDArray[np.uint64], plants: Array
+) -> None:
+    """Draw the plants of some episodes.
+
+    Parameters
+    ----------
+    first, last, draws
+        Range of the rows, and how plants are drawn.
+    bits : ndarray, shape (n, 3 + n_joints)
+        Bits of goals and starts.
+    plants : ndarray, shape (n, plant_width(n_actuated))
+        Where plants go.
+    """
+    state, drawn = np.empty(1, dtype=np.uint64), np.empty(draws.ranges.shape[0])
+    part, n_actuated = draws.time_step / SUBSTEPS, draws.step_limit.shape[0]
+    for e in range(first, last):
+        plant = plants[e]
+        state[0] = np.uint64(FIRST)
+        for i in range(bits.shape[1]):
+            state[0] = mixed(state[0] + np.uint64(STEP)) ^ bits[e, i]
+        plant[HIGH_BITS] = float(state[0] >> np.uint64(32))
+        plant[LOW_BITS] = float(state[0] & np.uint64(0xFFFFFFFF))
+        for i in range(drawn.shape[0]):
+            lower, upper = draws.ranges[i, 0], draws.ranges[i, 1]
+            drawn[i] = lower + uniform(state) * (upper - lower)
+        # As likely for each number of steps.
+        lower, upper = draws.ranges[0, 0], draws.ranges[0, 1]
+        plant[DELAY] = lower + math.floor(uniform(state) * (upper - lower + 1.0))
+        bandwidth, damping, acceleration, jerk = drawn[1], drawn[2], drawn[3], drawn[4]
+        plant[RESOLUTION], plant[NOISE], plant[GOAL_NOISE] = drawn[5], drawn[6], drawn[9]
+        fill_servo(plant, draws.order, bandwidth, damping, part)
+        limited = acceleration > 0.0
+        plant[MOST_CHANGE] = acceleration * part if limited else np.inf
+        plant[TRAPEZE] = 0.5 if bandwidth > 0.0 and draws.order == 2 else 0.0
+        plant[BRAKE] = acceleration * part * part if limited and bandwidth == 0.0 else 0.0
+        plant[JERK] = jerk * part * part
+        plant[EASE] = 0.5 * acceleration * acceleration / jerk * part if jerk > 0.0 else 0.0
+        for kind in range(2):
+            for axis in range(n_actuated):
+                offset = drawn[7 + kind] * (2.0 * uniform(state) - 1.0)
+                plant[OFFSETS + kind * n_actuated + axis] = offset
+        for i in range(3):
+            plant[OFFSETS + 2 * n_actuated + i] = drawn[10] * (2.0 * uniform(state) - 1.0)
+
+
+@inlined
+def fill_servo(plant: Array, order: int, bandwidth: float, damping: float, part: float) -> None:
+    """Fill in how a servo's error and velocity follow from those a part of a step before."""
+    rate = 6.283185307179586 * bandwidth
+    decay = rate * (damping if order == 2 else 1.0)
+    if bandwidth == 0.0 or decay * part > 500.0:
+        plant[SERVO], plant[SERVO + 1] = 0.0, 0.0
+        plant[SERVO + 2], plant[SERVO + 3] = -1.0 / part, 0.0
+    elif order == 1:
+        left = exponential(-rate * part)
+        plant[SERVO], plant[SERVO + 1] = left, 0.0
+        plant[SERVO + 2], plant[SERVO + 3] = (left - 1.0) / part, 0.0
+    else:
+        # e'' = -rate^2 e - 2 damping rate e', by its two exponentials or damped oscillation.
+        split = rate * math.sqrt(abs(1.0 - damping * damping))
+        if split * part < 1e-6:
+            even, odd = exponential(-decay * part), part * exponential(-decay * part)
+        elif damping < 1.0:
+            sine, cosine = sine_cosine(split * part)
+            left = exponential(-decay * part)
+            even, odd = left * cosine, left * sine / split
+        else:
+            slow, fast = exponential((split - decay) * part), exponential(-(split + decay) * part)
+            even, odd = 0.5 * (slow + fast), 0.5 * (slow - fast) / split
+        plant[SERVO], plant[SERVO + 1] = even + decay * odd, odd
+        plant[SERVO + 2], plant[SERVO + 3] = -rate * rate * odd, even - decay * odd
+
+
+@inlined
+def move_joints(chain: Chain, rules: Rules, fresh: bool, block: Block) -> None:
+    """Command the joints of a block, and fill in where they are at the step's end."""
+    plant, drive = block.plant, block.drive
+    n_actuated, longest = rules.step_limit.shape[0], drive.shape[0] - FORMER
+    part = rules.time_step / SUBSTEPS
+    brake, jerk = plant[0, BRAKE], plant[0, JERK]
+    brakes, eases = any_lane(brake > 0.0), any_lane(jerk > 0.0)
+    half = 0.5 * brake + plant[0, EASE]
+    for axis in range(n_actuated):
+        limit, lower, upper = rules.step_limit[axis], chain.lower[axis], chain.upper[axis]
+        command = min(max(drive[COMMAND, axis] + block.action[0, axis] * limit, lower), upper)
+        resolution = plant[0, RESOLUTION]
+        whole = nearest_whole(command / resolution) * resolution
+        command = select(resolution > 0.0, whole, command)
+        for k in range(longest - 1, 0, -1):
+            older, later = drive[FORMER + k, axis], drive[FORMER + k - 1, axis]
+            drive[FORMER + k, axis] = select(fresh, later, older)
+        if longest > 0:
+            drive[FORMER, axis] = select(fresh, drive[COMMAND, axis], drive[FORMER, axis])
+        drive[COMMAND, axis] = select(fresh, command, drive[COMMAND, axis])
+        told = command
+        for k in range(longest):
+            told = select(plant[0, DELAY] == k + 1.0, drive[FORMER + k, axis], told)
+        told += plant[0, OFFSETS + n_actuated + axis]
+        start, velocity, change = block.q[0, axis], drive[VELOCITY, axis], drive[CHANGE, axis]
+        q, fastest = start, limit / rules.time_step
+        for _ in range(SUBSTEPS):
+            error, ahead = q - told, velocity
+            exact = told + plant[0, SERVO] * error + plant[0, SERVO + 1] * velocity
+            if eases:
+                # Where the joint is, and how fast, once its acceleration has ended.
+                parts = select(jerk > 0.0, abs(change) / jerk, 0.0)
+                error += part * parts * (velocity + change * parts / 3.0)
+                ahead += 0.5 * change * parts
+            wanted = plant[0, SERVO + 2] * error + plant[0, SERVO + 3] * velocity
+            most, free = fastest + 0.0 * error, wanted - velocity
+            if brakes:
+                # So fast that it can still stop at the command.
+                stops = math.sqrt(half * half + 2.0 * brake * abs(error)) - half
+                most = select(brake > 0.0, min(most, stops / part), most)
+            former, change = change, min(max(wanted, -most), most) - ahead
+            change = min(max(change, -plant[0, MOST_CHANGE]), plant[0, MOST_CHANGE])
+            if eases:
+                # So much that acceleration can still end at that velocity.
+                ends = math.sqrt(0.25 * jerk * jerk + 2.0 * jerk * abs(change)) - 0.5 * jerk
+                eased = min(max(min(max(change, -ends), ends), former - jerk), former + jerk)
+                change = select(jerk > 0.0, eased, change)
+            velocity += change
+            way = part * (velocity - plant[0, TRAPEZE] * change)
+            q = select(change == free, exact, q + way)
+        within = min(max(q, max(lower, start - limit)), min(upper, start + limit))
+        stopped = (within <= lower) | (within >= upper)
+        velocity, change = select(stopped, 0.0, velocity), select(stopped, 0.0, change)
+        block.target[0, axis] = select(fresh, within, block.target[0, axis])
+        drive[VELOCITY, axis] = select(fresh, velocity, drive[VELOCITY, axis])
+        drive[CHANGE, axis] = select(fresh, change, drive[CHANGE, axis])
+
+
+@inlined
+def rest(e: int, episodes: Episodes) -> None:
+    """Let an episode's joints rest where they are."""
+    drive, n_actuated = episodes.drive, episodes.drive.shape[2]
+    for row in range(drive.shape[1]):
+        for axis in range(n_actuated):
+            command = episodes.q[e, axis] - episodes.plant[e, OFFSETS + n_actuated + axis]
+            drive[e, row, axis] = 0.0 if row in (VELOCITY, CHANGE) else command
+
+
+@inlined
+def sense(chain: Chain, rules: Rules, block: Block) -> None:
+    """Fill in which joint positions and goal are seen, and the poses there."""
+    plant, n_actuated = block.plant, rules.step_limit.shape[0]
+    for joint in range(block.q.shape[1]):
+        block.sensed[0, joint] = block.q[0, joint]
+    for axis in range(n_actuated):
+        bias, calibration = plant[0, OFFSETS + axis], plant[0, OFFSETS + n_actuated + axis]
+        block.sensed[0, axis] += bias - calibration
+    for i in range(3):
+        block.seen_goal[0, i] = block.goal[0, i] + plant[0, OFFSETS + 2 * n_actuated + i]
+    if any_lane((plant[0, NOISE] > 0.0) | (plant[0, GOAL_NOISE] > 0.0)):
+        add_noise(block, n_actuated)
+    if rules.commanded == 1:
+        for axis in range(n_actuated):
+            block.sensed[0, axis] = block.drive[COMMAND, axis]
+    forward_kinematics(chain, block.sensed, 0, block.seen_poses)
+
+
+@inlined
+def add_noise(block: Block, n_actuated: int) -> None:
+    """Add noise to what is seen: sums of four numbers, nearly normal, within 3.5 deviations."""
+    plant, steps = as_numbers(block.plant), as_numbers(block.steps)
+    sensed, goal = as_numbers(block.sensed), as_numbers(block.seen_goal)
+    for lane in range(plant.shape[2]):
+        high, low = np.uint64(plant[0, HIGH_BITS, lane]), np.uint64(plant[0, LOW_BITS, lane])
+        state = (high << np.uint64(32)) | low
+        state += np.uint64(STEP) * np.uint64(1 + int(steps[0, lane]) * (n_actuated + 3))
+        for i in range(n_actuated + 3):
+            bits = mixed(state)
+            state += np.uint64(STEP)
+            total = 2.0 * 2.0**-16 - 2.0
+            for _ in range(4):
+                total += float(bits & np.uint64(0xFFFF)) * 2.0**-16
+                bits >>= np.uint64(16)
+            # The variance of four such numbers is a third.
+            total *= 1.7320508075688772
+            if i < n_actuated:
+                sensed[0, i, lane] += plant[0, NOISE, lane] * total
+            else:
+                goal[0, i - n_actuated, lane] += plant[0, GOAL_NOISE, lane] * total

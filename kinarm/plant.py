@@ -1,0 +1,161 @@
+"""The plant: what lies between commands and joints, and between joints and what is seen."""
+
+from dataclasses import dataclass, field, fields
+from typing import Any, Literal, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kinarm._fields import OPTIONAL, Checked, from_plain, read_toml
+from kinarm._files import named_file, shipped_files
+from kinarm.errors import NOT_NEGATIVE, ProblemError
+
+LONGEST_DELAY = 32
+"""Largest delay [steps]: an episode holds as many commands."""
+
+FASTEST_SERVO = 1e4
+"""Largest bandwidth [Hz]."""
+
+Range = float | tuple[float, float]
+"""A number, or a range from which each episode draws one."""
+
+SETTING = {**OPTIONAL, **NOT_NEGATIVE}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Plant(Checked):
+    """What lies between a command and the joints, and between the joints and what is seen.
+
+    Each setting is a number, or a range from which every episode draws its own,
+    uniformly. Zero leaves an effect out. In each step an action moves the
+    command; with a delay, servos get an earlier one. Joints never exceed their
+    velocity limits.
+
+    Parameters
+    ----------
+    delay : int or tuple of int
+        Steps by which a command comes late, 32 at most.
+    bandwidth : float or tuple of float
+        Natural frequency of the servos [Hz]; 0 for joints that obey at once.
+    damping : float or tuple of float
+        Their damping ratio; 1 is critical.
+    order : {1, 2}
+        Whether a servo sets the speed, or the acceleration.
+    acceleration : float or tuple of float
+        Largest acceleration of a joint [rad/s^2 or m/s^2]. Servos are cut off
+        there; joints without servos brake in time for it.
+    jerk : float or tuple of float
+        Largest rate of the acceleration [rad/s^3 or m/s^3], of joints without
+        servos whose acceleration is limited.
+    resolution : float or tuple of float
+        Steps in which joints are commanded [rad or m].
+    noise : float or tuple of float
+        Standard deviation of each measurement of a joint [rad or m].
+    bias : float or tuple of float
+        Measured joints are off by up to it, each by its own amount, throughout
+        an episode [rad or m].
+    calibration : float or tuple of float
+        Joints are up to so far from where both command and measurement have
+        them [rad or m].
+    goal_noise : float or tuple of float
+        Standard deviation of each coordinate of the goal, as seen in a step [m].
+    goal_bias : float or tuple of float
+        The goal is seen up to so far from where it is, along each axis [m].
+    feedback : {"measured", "commanded"}
+        Which joint positions are seen: measured ones, or the command's. Actions
+        count from the command.
+    """
+
+    delay: int | tuple[int, int] = field(default=0, metadata={**OPTIONAL, "at_least": 0})
+    bandwidth: Range = field(default=0.0, metadata=SETTING)
+    damping: Range = field(default=1.0, metadata=SETTING)
+    order: Literal[1, 2] = field(default=2, metadata=OPTIONAL)
+    acceleration: Range = field(default=0.0, metadata=SETTING)
+    jerk: Range = field(default=0.0, metadata=SETTING)
+    resolution: Range = field(default=0.0, metadata=SETTING)
+    noise: Range = field(default=0.0, metadata=SETTING)
+    bias: Range = field(default=0.0, metadata=SETTING)
+    calibration: Range = field(default=0.0, metadata=SETTING)
+    goal_noise: Range = field(default=0.0, metadata=SETTING)
+    goal_bias: Range = field(default=0.0, metadata=SETTING)
+    feedback: Literal["measured", "commanded"] = field(default="measured", metadata=OPTIONAL)
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        for name in RANGES:
+            lower, upper = self.range_of(name)
+            if lower > upper:
+                raise ProblemError(f"{name} must be a range from low to high, got {lower}, {upper}")
+            if lower == 0 < upper and name in ("bandwidth", "acceleration", "jerk"):
+                raise ProblemError(f"a range of {name} starts above 0, which stands for no limit")
+        if self.jerk and (self.bandwidth or not self.acceleration):
+            raise ProblemError("jerk needs a limit of acceleration, and joints without servos")
+        if self.range_of("delay")[1] > LONGEST_DELAY:
+            raise ProblemError(f"delay must be at most {LONGEST_DELAY} steps, got {self.delay}")
+        if self.range_of("bandwidth")[1] > FASTEST_SERVO:
+            raise ProblemError(f"bandwidth must be at most {FASTEST_SERVO:g} Hz")
+
+    @classmethod
+    def load(cls, plant: "PlantLike") -> "Plant":
+        """Find a plant by name, such as ``"hard"``, or read it from a TOML file."""
+        if isinstance(plant, Plant):
+            return plant
+        path = named_file("plant", plant)
+        return from_plain(cls, read_toml(path, "plant"), str(path))
+
+    @property
+    def ideal(self) -> bool:
+        """Whether joints are where they are told to be, and so seen."""
+        blank = Plant(damping=self.damping, order=self.order)
+        return self in (blank, Plant(**{**vars(blank), "feedback": "commanded"}))
+
+    def range_of(self, name: str) -> tuple[float, float]:
+        """Lower and upper end of a setting."""
+        value = getattr(self, name)
+        return value if isinstance(value, tuple) else (value, value)
+
+
+RANGES = tuple(item.name for item in fields(Plant) if item.name not in ("order", "feedback"))
+"""Names of the settings that an episode draws, in the order of `PlantDraws.ranges`."""
+
+
+def plant_names() -> tuple[str, ...]:
+    """Names of the plants that ship."""
+    return tuple(shipped_files("plants"))
+
+
+PlantLike = Plant | str | Any
+"""A plant, its name or its file."""
+
+
+class PlantDraws(NamedTuple):
+    """How the plants of episodes are drawn, and their sizes, for the kernels.
+
+    Attributes
+    ----------
+    ranges : ndarray, shape (n_ranges, 2)
+        Lower and upper ends of `RANGES`.
+    order, longest : int
+        Order of the servos, and largest delay [steps].
+    time_step : float
+        Duration of a step [s].
+    step_limit : ndarray, shape (n_actuated,)
+        Largest move of each joint in a step [rad or m].
+    """
+
+    ranges: NDArray[np.float64]
+    order: int
+    longest: int
+    time_step: float
+    step_limit: NDArray[np.float64]
+
+    @classmethod
+    def of(cls, plant: Plant, time_step: float, step_limit: NDArray[np.float64]) -> "PlantDraws":
+        """Flatten a plant, for steps of a duration [s] and moves of at most so much."""
+        return cls(
+            ranges=np.array([plant.range_of(name) for name in RANGES], dtype=np.float64),
+            order=plant.order,
+            longest=int(plant.range_of("delay")[1]),
+            time_step=time_step,
+            step_limit=step_limit,
+        )

@@ -1,0 +1,236 @@
+"""Plants: by hand, by differential equations, and as a whole."""
+
+import numpy as np
+import pytest
+from reference_episodes import assert_equal_outcome, held_actions
+from scipy.integrate import solve_ivp
+
+from kinarm.errors import KinarmError
+from kinarm.plant import Plant, plant_names
+from kinarm.problem import ReachProblem
+from kinarm.reference import ReferenceSimulator
+from kinarm.simulator import Simulator
+
+EVERYTHING = {
+    "delay": (0, 3),
+    "bandwidth": (5.0, 50.0),
+    "damping": (0.5, 1.5),
+    "acceleration": (50.0, 400.0),
+    "resolution": 1e-3,
+    "noise": 0.01,
+    "bias": 0.01,
+    "calibration": (0.0, 0.02),
+    "goal_noise": 0.003,
+    "goal_bias": 0.01,
+}
+
+
+def simulator_with(**plant):
+    return Simulator("right", threads=1).with_plant(Plant(**plant))
+
+
+def steps_of(simulator, actions):
+    """Joint positions of an arm from home that is far from everything, a row a step."""
+    start, goal = simulator.arm.home[None], np.array([[0.0, 0.0, 3.0]])
+    episodes = simulator.reset(start, goal)
+    path = [episodes.q[0].copy()]
+    for action in actions:
+        assert not simulator.step(episodes, np.asarray(action)[None]).terminated[0]
+        path.append(episodes.q[0].copy())
+    return np.array(path)
+
+
+@pytest.mark.parametrize(
+    ("settings", "acceleration"),
+    [
+        ({"bandwidth": 4.0}, lambda w, e, v: -w * w * e - 2 * w * v),
+        ({"bandwidth": 4.0, "damping": 0.3}, lambda w, e, v: -w * w * e - 0.6 * w * v),
+        ({"bandwidth": 4.0, "damping": 1.7}, lambda w, e, v: -w * w * e - 3.4 * w * v),
+    ],
+)
+def test_servo_follows_its_differential_equation(settings, acceleration):
+    simulator, rate = simulator_with(**settings), 2 * np.pi * 4.0
+    moves = np.array([0.6] * 8 + [-0.2] * 4 + [0.0] * 12)
+    path = steps_of(simulator, moves[:, None] * [1, 0, 0, 0, 0])[:, 0]
+    commands, state, solved = np.cumsum(moves) * simulator.step_limit[0], np.zeros(2), [0.0]
+    for command in commands:
+        motion = solve_ivp(
+            lambda _, y, told=command: (y[1], acceleration(rate, y[0] - told, y[1])),
+            (0, simulator.problem.stepping.time_step),
+            state,
+            rtol=1e-10,
+            atol=1e-12,
+        )
+        state = motion.y[:, -1]
+        solved.append(state[0])
+    np.testing.assert_allclose(path, solved, rtol=0, atol=1e-8)
+
+
+def test_servo_of_first_order_closes_a_share_of_the_way():
+    simulator = simulator_with(bandwidth=3.0, order=1)
+    path = steps_of(simulator, [[0.5, 0, 0, 0, 0], *[[0] * 5] * 9])[:, 0]
+    left = np.exp(-2 * np.pi * 3.0 * 0.02 * np.arange(11))
+    told = 0.5 * simulator.step_limit[0]
+    np.testing.assert_allclose(path, told * (1 - left), rtol=0, atol=1e-14)
+
+
+def test_delay_gives_earlier_commands():
+    moves = np.random.default_rng(0).uniform(-0.4, 0.4, (12, 5))
+    now, late = (steps_of(simulator_with(noise=1e-9, delay=delay), moves) for delay in (0, 3))
+    np.testing.assert_allclose(late[3:], now[:-3], rtol=0, atol=1e-15)
+    np.testing.assert_array_equal(late[:4], now[[0, 0, 0, 0]])
+
+
+@pytest.mark.parametrize("settings", [{}, {"bandwidth": 20.0}, {"jerk": 2000.0}])
+def test_limits_of_speed_and_acceleration_hold(settings):
+    simulator = simulator_with(acceleration=60.0, **settings)
+    moves = np.concatenate([np.full(6, 0.5), np.zeros(6), np.full(10, -0.5), np.zeros(6)])
+    path = steps_of(simulator, moves[:, None] * np.ones(5))[:, :5]
+    changes = np.diff(path, n=2, axis=0) / 0.02**2
+    assert np.abs(np.diff(path, axis=0) / simulator.step_limit).max() < 1 + 1e-12
+    assert 20 < np.abs(changes).max() < 60 * (1 + 1e-9)
+    if "jerk" in settings:
+        assert np.abs(np.diff(changes, axis=0)).max() / 0.02 < 2000
+
+
+@pytest.mark.parametrize("jerk", [0.0, 5000.0])
+def test_joints_without_servos_stop_at_the_command(jerk):
+    simulator = simulator_with(acceleration=30.0, jerk=jerk)
+    path = steps_of(simulator, [[1, 0, 0, 0, 0]] * 6 + [[0] * 5] * 60)[:, 0]
+    told = 6 * simulator.step_limit[0]
+    assert (path[-40:] <= told * (1.001 if jerk else 1 + 1e-12)).all()
+    np.testing.assert_allclose(path[-1], told, rtol=1e-6)
+
+
+def test_offsets_stay_for_an_episode_and_commands_come_in_steps():
+    simulator = simulator_with(resolution=0.01, calibration=0.02, bias=0.03, goal_bias=0.05)
+    starts, goals = simulator.sample(np.random.default_rng(0), 200)
+    episodes = simulator.reset(starts, goals)
+    off, seen = episodes.sensed - episodes.q, episodes.observation[:, :3] - goals
+    simulator.step(episodes, np.full((200, 5), 0.1))
+    moved = np.flatnonzero(episodes.status == 0)
+    assert len(moved) > 150
+    assert 0.045 < np.abs(off[:, :5]).max() <= 0.05
+    assert 0.045 < np.abs(seen).max() <= 0.05
+    assert not off[:, 5:].any()
+    np.testing.assert_allclose(episodes.sensed[moved], episodes.q[moved] + off[moved], atol=1e-15)
+    commands = episodes.drive[moved, 0] / 0.01
+    np.testing.assert_allclose(commands, np.round(commands), rtol=0, atol=1e-9)
+    calibration = episodes.q[moved, :5] - episodes.drive[moved, 0]
+    assert 0.015 < np.abs(calibration).max() <= 0.02
+    shown = Simulator("right").world.observe(episodes.sensed, episodes.observation[:, :3])
+    np.testing.assert_array_equal(episodes.observation, shown)
+
+
+def test_noise_has_its_deviation_and_differs_by_step_joint_and_episode():
+    simulator = simulator_with(noise=0.01, goal_noise=0.02)
+    starts, goals = simulator.sample(np.random.default_rng(0), 500)
+    episodes, seen = simulator.reset(starts, goals), []
+    for _ in range(20):
+        simulator.step(episodes, np.zeros((500, 5)))
+        off = (episodes.sensed - episodes.q)[:, :5] / 0.01
+        seen.append(np.concatenate([off, (episodes.observation[:, :3] - goals) / 0.02], axis=1))
+    noise = np.array(seen)
+    assert np.abs(noise.mean(axis=(0, 1))).max() < 0.05
+    np.testing.assert_allclose(noise.std(axis=(0, 1)), 1, atol=0.03)
+    assert np.abs(noise).max() <= 2 * np.sqrt(3)
+    assert np.abs(np.corrcoef(noise.reshape(-1, 8).T) - np.eye(8)).max() < 0.05
+    assert abs(np.corrcoef(noise[:-1].ravel(), noise[1:].ravel())[0, 1]) < 0.03
+
+
+def test_commanded_positions_are_seen_in_place_of_measured_ones():
+    simulator = simulator_with(bandwidth=3.0, noise=0.1, feedback="commanded")
+    starts, goals = simulator.sample(np.random.default_rng(0), 20)
+    episodes = simulator.reset(starts, goals)
+    for _ in range(3):
+        simulator.step(episodes, np.full((20, 5), 0.5))
+    told = starts[:, :5] + 1.5 * simulator.step_limit
+    free = (episodes.status == 0) & (np.abs(told) < simulator.arm.upper[:5]).all(axis=1)
+    np.testing.assert_allclose(episodes.sensed[free, :5], told[free], rtol=0, atol=1e-12)
+    assert (episodes.q[free, :5] < told[free]).all()
+
+
+@pytest.mark.parametrize(
+    "change",
+    [{}, {"feedback": "commanded"}, {"bandwidth": 0.0, "jerk": (2e3, 2e4)}, {"order": 1}],
+)
+def test_rollouts_equal_the_reference(change):
+    simulator = simulator_with(**{**EVERYTHING, **change})
+    starts, goals = simulator.sample(np.random.default_rng(3), 12)
+    policy = np.random.default_rng(4).normal(size=(48, 5)) / 12
+    rollouts = simulator.rollout(lambda seen: seen @ policy, starts, goals, record=True)
+    reference = ReferenceSimulator(simulator)
+    for i in range(12):
+        episode = reference.rollout(lambda seen: seen @ policy, starts[i], goals[i])
+        assert_equal_outcome(simulator, rollouts, i, episode, atol=1e-10)
+
+
+def test_results_depend_on_the_episode_alone():
+    alone, shared = (Simulator("both", threads=n).with_plant(Plant(**EVERYTHING)) for n in (1, 3))
+    rng = np.random.default_rng(5)
+    starts, goals = shared.sample(rng, 3000)
+    actions = held_actions(shared, rng, 3000)
+    whole = shared.rollout_actions(actions, starts, goals)
+    rows = np.arange(7, 2000, 13)
+    part = alone.rollout_actions(actions[rows], starts[rows], goals[rows])
+    for name in ("configurations", "targets", "steps", "returns", "distance"):
+        np.testing.assert_array_equal(getattr(whole, name)[rows], getattr(part, name))
+    assert len(np.unique(whole.steps)) > 10
+
+
+def test_episodes_that_go_on_keep_their_state():
+    simulator = simulator_with(**EVERYTHING)
+    starts, goals = simulator.sample(np.random.default_rng(6), 50)
+    whole, actions = simulator.reset(starts, goals), np.full((50, 5), 0.2)
+    for _ in range(4):
+        simulator.step(whole, actions)
+    going_on = {"origins": starts, "taken": whole.steps, "drive": whole.drive.copy()}
+    later = simulator.reset(whole.q, goals, **going_on)
+    running = whole.status == 0
+    for _ in range(3):
+        simulator.step(whole, actions)
+        simulator.step(later, actions)
+    np.testing.assert_array_equal(later.q[running], whole.q[running])
+    np.testing.assert_array_equal(later.observation[running], whole.observation[running])
+
+
+def test_ideal_plants_change_nothing():
+    problem = ReachProblem.load("right")
+    assert problem.replace(plant="ideal").digest == problem.digest
+    assert Plant(feedback="commanded").ideal
+    assert not Plant(delay=1).ideal
+
+
+@pytest.mark.parametrize("name", plant_names())
+def test_shipped_plants_survive_files(name, tmp_path):
+    problem = ReachProblem.load("both").replace(plant=name, horizon=50)
+    problem.save(tmp_path / "mine.toml")
+    assert ReachProblem.load(tmp_path / "mine.toml").first_difference(problem) is None
+    (tmp_path / "named.toml").write_text(f'base = "both"\nplant = "{name}"\n')
+    assert ReachProblem.load(tmp_path / "named.toml").plant == problem.plant
+
+
+@pytest.mark.parametrize(
+    ("settings", "words"),
+    [
+        ({"delay": -1}, "delay must be a whole number of at least 0"),
+        ({"delay": 33}, "at most 32 steps"),
+        ({"delay": (2, 1)}, "from low to high"),
+        ({"delay": (0, 1, 2)}, "delay must be"),
+        ({"delay": 0.5}, "delay must be a whole number"),
+        ({"bandwidth": (0.0, 5.0)}, "starts above 0"),
+        ({"bandwidth": 1e5}, "at most 10000 Hz"),
+        ({"jerk": 100.0}, "jerk needs a limit of acceleration"),
+        ({"noise": -0.1}, "noise must not be negative"),
+        ({"order": 3}, "order must be one of 1, 2"),
+        ({"feedback": "none"}, "feedback must be one of measured, commanded"),
+    ],
+)
+def test_settings_out_of_range_are_refused(settings, words):
+    with pytest.raises(KinarmError, match=words):
+        Plant(**settings)
+
+
+def test_unknown_plants_are_named():
+    with pytest.raises(KinarmError, match=r"unknown plant 'soft'.*hard"):
+        ReachProblem.load("right").replace(plant="soft")
