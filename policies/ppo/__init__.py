@@ -296,7 +296,7 @@ class PPOState(TrainingState):
             if len({array.shape for array in arrays}) > 1 or arrays[0].ndim != 1:
                 shapes = ", ".join(str(array.shape) for array in arrays)
                 raise InvalidInputError(f"parts of the state have the shapes {shapes}")
-        if len({len(array) for array in self.episodes}) > 1:
+        if len({len(array) for array in self.episodes if array.size}) > 1:
             raise InvalidInputError("parts of the episodes' states are not as many")
         self.failed.check()
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from reference_episodes import assert_equal_outcome, held_actions
+from reference_episodes import assert_equal_outcome, held_actions, scripted
 from scipy.integrate import solve_ivp
 
 from kinarm.errors import KinarmError
@@ -155,14 +155,20 @@ def test_commanded_positions_are_seen_in_place_of_measured_ones():
     [{}, {"feedback": "commanded"}, {"bandwidth": 0.0, "jerk": (2e3, 2e4)}, {"order": 1}],
 )
 def test_rollouts_equal_the_reference(change):
-    simulator = simulator_with(**{**EVERYTHING, **change})
-    starts, goals = simulator.sample(np.random.default_rng(3), 12)
-    policy = np.random.default_rng(4).normal(size=(48, 5)) / 12
-    rollouts = simulator.rollout(lambda seen: seen @ policy, starts, goals, record=True)
-    reference = ReferenceSimulator(simulator)
+    simulator, rng = simulator_with(**{**EVERYTHING, **change}), np.random.default_rng(3)
+    starts, goals = simulator.sample(rng, 12)
+    actions = held_actions(simulator, rng, 12)
+    rollouts = simulator.rollout_actions(actions, starts, goals, record=True)
+    reference, episodes = ReferenceSimulator(simulator), simulator.reset(starts, goals)
+    seen = [episodes.observation.copy()]
+    for step in range(64):
+        simulator.step(episodes, actions[:, step])
+        seen.append(episodes.observation.copy())
     for i in range(12):
-        episode = reference.rollout(lambda seen: seen @ policy, starts[i], goals[i])
-        assert_equal_outcome(simulator, rollouts, i, episode, atol=1e-10)
+        episode = reference.rollout(scripted(actions[i]), starts[i], goals[i])
+        assert_equal_outcome(simulator, rollouts, i, episode)
+        last = episode.observations[: len(episode.rewards) + (not episode.collision)]
+        np.testing.assert_allclose([each[i] for each in seen[: len(last)]], last, atol=1e-12)
 
 
 def test_results_depend_on_the_episode_alone():
