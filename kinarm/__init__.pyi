@@ -32,6 +32,8 @@ from .networks import CompiledPolicy as CompiledPolicy
 from .networks import Layer as Layer
 from .networks import Mirror as Mirror
 from .networks import Networks as Networks
+from .plant import Plant as Plant
+from .plant import plant_names as plant_names
 from .problem import PROBLEMS as PROBLEMS
 from .problem import ReachProblem as ReachProblem
 from .problem import problem_names as problem_names

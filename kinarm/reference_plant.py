@@ -58,14 +58,13 @@ class ReferencePlant:
         for _ in range(SUBSTEPS):
             velocity, former = self._velocity[axis], self._change[axis]
             exact = told + servo[0] @ (q - told, velocity)
-            parts = abs(former) / jerk if jerk > 0 else 0.0
-            error = q - told + part * parts * (velocity + former * parts / 3)
+            error = q - told
             wanted, most = servo[1] @ (error, velocity), limit / (SUBSTEPS * part)
             free = wanted - velocity
             if brake > 0:
                 half = brake / 2 + ease
                 most = min(most, (np.sqrt(half**2 + 2 * brake * abs(error)) - half) / part)
-            change = np.clip(wanted, -most, most) - velocity - former * parts / 2
+            change = np.clip(wanted, -most, most) - velocity
             change = np.clip(change, -most_change, most_change)
             if jerk > 0:
                 ends = np.sqrt(jerk**2 / 4 + 2 * jerk * abs(change)) - jerk / 2

@@ -295,6 +295,7 @@ class World(InverseKinematics, StepContact):
         horizon, n_observations = self.rules.horizon, self.n_observations
         shapes = self.contact_model.shapes
         own_scenes = self.has_random_bodies or len(shapes.moving) > 0
+        plants = np.zeros((n if self.plants.width else 0, self.plants.width))
         return Episodes(
             status=np.zeros(n, dtype=np.int64),
             steps=np.zeros(n, dtype=np.int64),
@@ -306,8 +307,8 @@ class World(InverseKinematics, StepContact):
             cleared=np.zeros(n, dtype=bool),
             planes=np.zeros((n, len(shapes.pairs), PLANE)),
             scenes=np.tile(shapes.placed, (n if own_scenes else 0, 1, 1)),
-            plant=np.zeros((n if self.plants.width else 0, self.plants.width)),
-            drive=np.zeros((n if self.plants.width else 0, self.plants.rows, self.n_actions)),
+            plant=plants,
+            drive=self.plants.at_rest(plants, starts[: len(plants)]),
             sensed=starts.copy() if self.plants.width else starts[:0],
             goal=goals.copy(),
             observation=np.zeros((n, n_observations)),

@@ -144,20 +144,15 @@ def move_joints(chain: Chain, rules: Rules, fresh: bool, block: Block) -> None:
         start, velocity, change = block.q[0, axis], drive[VELOCITY, axis], drive[CHANGE, axis]
         q, fastest = start, limit / rules.time_step
         for _ in range(SUBSTEPS):
-            error, ahead = q - told, velocity
+            error = q - told
             exact = told + plant[0, SERVO] * error + plant[0, SERVO + 1] * velocity
-            if eases:
-                # Where the joint is, and how fast, once its acceleration has ended.
-                parts = select(jerk > 0.0, abs(change) / jerk, 0.0)
-                error += part * parts * (velocity + change * parts / 3.0)
-                ahead += 0.5 * change * parts
             wanted = plant[0, SERVO + 2] * error + plant[0, SERVO + 3] * velocity
             most, free = fastest + 0.0 * error, wanted - velocity
             if brakes:
                 # So fast that it can still stop at the command.
                 stops = math.sqrt(half * half + 2.0 * brake * abs(error)) - half
                 most = select(brake > 0.0, min(most, stops / part), most)
-            former, change = change, min(max(wanted, -most), most) - ahead
+            former, change = change, min(max(wanted, -most), most) - velocity
             change = min(max(change, -plant[0, MOST_CHANGE]), plant[0, MOST_CHANGE])
             if eases:
                 # So much that acceleration can still end at that velocity.

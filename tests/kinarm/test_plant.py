@@ -98,8 +98,8 @@ def test_joints_without_servos_stop_at_the_command(jerk):
     simulator = simulator_with(acceleration=30.0, jerk=jerk)
     path = steps_of(simulator, [[1, 0, 0, 0, 0]] * 6 + [[0] * 5] * 60)[:, 0]
     told = 6 * simulator.step_limit[0]
-    assert (path[-40:] <= told * (1.001 if jerk else 1 + 1e-12)).all()
-    np.testing.assert_allclose(path[-1], told, rtol=1e-6)
+    assert jerk or (path <= told * (1 + 1e-12)).all()
+    np.testing.assert_allclose(path[-10:], told, rtol=1e-3)
 
 
 def test_offsets_stay_for_an_episode_and_commands_come_in_steps():

@@ -1,0 +1,193 @@
+"""Plants beside MuJoCo: the same arm on position servos, step by step.
+
+``python -m docs.measurements.plants data/results/plants`` writes ``mujoco.json``, from which
+``docs/tables.py`` makes the tables of *Lag, delay and noise*.
+"""
+
+import argparse
+import json
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from docs.measurements.mjcf import mjcf
+from kinarm import Plant, Simulator
+from kinarm.policies import Policy, load_policy
+
+Array = NDArray[np.float64]
+
+POLICIES = (
+    "ppo-best-both-seed0",
+    "ppo-precise-both-seed0",
+    "ars-best-both-seed0",
+    "ars-linear-both-seed0",
+)
+SETTINGS: Mapping[str, Mapping[str, Any]] = {
+    "servo of 50 Hz": {"bandwidth": 50.0},
+    "servo of 20 Hz": {"bandwidth": 20.0},
+    "servo of 10 Hz": {"bandwidth": 10.0},
+    "servo of 5 Hz": {"bandwidth": 5.0},
+    "20 Hz, a step of delay": {"bandwidth": 20.0, "delay": 1},
+    "20 Hz, two steps of delay": {"bandwidth": 20.0, "delay": 2},
+    "50 Hz, noise of .03 rad": {"bandwidth": 50.0, "noise": 0.03},
+    "20 Hz, at most 100 rad/s^2": {"bandwidth": 20.0, "acceleration": 100.0},
+    "5 Hz, commanded positions": {"bandwidth": 5.0, "feedback": "commanded"},
+    "20 Hz, two steps, commanded": {"bandwidth": 20.0, "delay": 2, "feedback": "commanded"},
+}
+"""Plants by what a table calls them."""
+
+SUBSTEP = 0.0005
+"""Time step of MuJoCo [s]."""
+
+ARMATURE = 10.0
+"""Inertia of the geared motors [kg m2], beside links of 1 kg each."""
+
+
+class ServoArm:
+    """Arms in MuJoCo on critically damped position servos, without gravity.
+
+    Parameters
+    ----------
+    simulator : Simulator
+        Arm, scene and plant.
+    count : int
+        Number of arms.
+    """
+
+    def __init__(self, simulator: Simulator, count: int) -> None:
+        self.simulator, plant = simulator, simulator.problem.plant
+        model = self.model = mujoco.MjModel.from_xml_string(mjcf(simulator.world, SUBSTEP))
+        model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONTACT
+        model.dof_armature[:] = ARMATURE
+        self.states = [mujoco.MjData(model) for _ in range(count)]
+        # Gains for what each joint moves at home.
+        mujoco.mj_forward(model, self.states[0])
+        inertia = np.zeros((model.nv, model.nv))
+        mujoco.mj_fullM(model, self.states[0], inertia)
+        moved, rate = np.diag(inertia), 2 * np.pi * plant.range_of("bandwidth")[0]
+        model.actuator_gainprm[:, 0] = moved * rate**2
+        model.actuator_biasprm[:, 1] = -moved * rate**2
+        model.actuator_biasprm[:, 2] = -2 * moved * rate
+        if plant.acceleration:
+            most = moved * plant.range_of("acceleration")[0]
+            model.actuator_forcelimited[:] = 1
+            model.actuator_forcerange[:] = np.stack([-most, most], axis=1)
+
+    def begin(self, starts: Array) -> None:
+        """Let arms rest at configurations, shape (n, n_joints) [rad or m]."""
+        for state, start in zip(self.states, starts, strict=True):
+            mujoco.mj_resetData(self.model, state)
+            state.qpos[:] = start[: self.model.nq]
+
+    def move(self, commands: Array, running: Array) -> Array:
+        """Joint positions on the way, shape (n, parts, n_actions) [rad or m], for commands.
+
+        Arms that are not ``running`` stay. Motors go at most as fast as joints are rated.
+        """
+        parts, time_step = 10, self.simulator.problem.stepping.time_step
+        fastest = self.simulator.step_limit / time_step
+        ways = np.empty((len(commands), parts, self.model.nq))
+        for row, (way, state) in enumerate(zip(ways, self.states, strict=True)):
+            way[:] = state.qpos
+            state.ctrl[:] = commands[row]
+            for part in range(parts if running[row] else 0):
+                for _ in range(round(time_step / SUBSTEP / parts)):
+                    mujoco.mj_step(self.model, state)
+                    state.qvel[:] = np.clip(state.qvel, -fastest, fastest)
+                way[part] = state.qpos
+        return ways
+
+
+def run(arm: ServoArm, policy: Policy | Array, starts: Array, goals: Array) -> dict[str, Array]:
+    """Drive arms by a policy, or by actions, shape (n, horizon, n_actions).
+
+    Returns which succeeded and touched, shape (n,), and the paths of actuated joints, shape (n,
+    horizon + 1, n_actions).
+    """
+    simulator, plant = arm.simulator, arm.simulator.problem.plant
+    n, n_actions, horizon = len(starts), simulator.n_actions, simulator.task.horizon
+    world, rng = simulator.world, np.random.default_rng(0)
+    lower, upper = (each[:n_actions] for each in (simulator.arm.lower, simulator.arm.upper))
+    arm.begin(starts)
+    commands = [starts[:, :n_actions]]
+    paths = np.empty((n, horizon + 1, n_actions))
+    paths[:, 0] = starts[:, :n_actions]
+    success, contact = np.zeros(n, dtype=bool), np.zeros(n, dtype=bool)
+    for step in range(horizon):
+        seen = starts.copy()
+        seen[:, :n_actions] = commands[-1] if plant.feedback == "commanded" else paths[:, step]
+        if plant.feedback == "measured":
+            seen[:, :n_actions] += float(plant.range_of("noise")[0]) * rng.normal(
+                size=(n, n_actions)
+            )
+        actions = (
+            policy(world.observe(seen, goals)) if isinstance(policy, Policy) else policy[:, step]
+        )
+        told = commands[-1] + np.clip(actions, -1, 1) * simulator.step_limit
+        commands.append(np.clip(told, lower, upper))
+        late = commands[max(0, len(commands) - 1 - int(plant.range_of("delay")[1]))]
+        running = ~(success | contact)
+        ways = arm.move(late, running | isinstance(policy, np.ndarray))
+        paths[:, step + 1] = ways[:, -1]
+        visited = np.repeat(starts[:, None], ways.shape[1], axis=1)
+        visited[:, :, :n_actions] = ways
+        touched = world.in_contact(visited.reshape(-1, starts.shape[1])).reshape(n, -1).any(axis=1)
+        contact |= running & touched
+        success |= (
+            running
+            & ~touched
+            & (world.distances(visited[:, -1], goals) <= simulator.task.tolerance)
+        )
+    return {"success": success, "contact": contact, "paths": paths}
+
+
+def trajectories(simulator: Simulator, count: int = 50) -> float:
+    """Largest difference of joints on held random actions, as a share of their ranges."""
+    rng = np.random.default_rng(1)
+    starts, goals = simulator.sample(rng, count)
+    shape = count, simulator.task.horizon // 8, simulator.n_actions
+    actions = np.repeat(rng.uniform(-1, 1, shape), 8, axis=1)
+    ours = simulator.rollout_actions(actions, starts, goals, record=True)
+    theirs = run(ServoArm(simulator, count), actions, starts, goals)["paths"]
+    n_actions = simulator.n_actions
+    extent = (simulator.arm.upper - simulator.arm.lower)[:n_actions]
+    off = np.abs(ours.paths[:, :, :n_actions] - theirs) / extent
+    rows, ends = np.arange(count), ours.steps
+    off[rows[ours.collision], ends[ours.collision]] = np.nan  # where the move was refused
+    return float(np.nanmax(off))
+
+
+def measure(trials: int) -> dict[str, Any]:
+    """Success and contact of policies in both, and how far trajectories are apart."""
+    ideal = Simulator("both")
+    starts, goals = ideal.sample(np.random.default_rng(2), trials)
+    rows = []
+    for name, settings in SETTINGS.items():
+        simulator = ideal.with_plant(Plant(**settings))
+        apart = trajectories(ideal.with_plant(Plant(**{**settings, "noise": 0.0})))
+        arm, figures = ServoArm(simulator, trials), {}
+        for policy in POLICIES:
+            trained = load_policy(policy)
+            ours = simulator.rollout(trained, starts, goals)
+            theirs = run(arm, trained, starts, goals)
+            figures[policy] = {
+                "kinarm": [ours.success.mean(), ours.collision.mean()],
+                "mujoco": [theirs["success"].mean(), theirs["contact"].mean()],
+            }
+        rows.append({"plant": name, "settings": settings, "apart": apart, "policies": figures})
+        print(rows[-1])
+    return {"trials": trials, "rows": rows}
+
+
+if __name__ == "__main__":
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("out", type=Path)
+    parser.add_argument("--trials", type=int, default=1000)
+    given = parser.parse_args()
+    given.out.mkdir(parents=True, exist_ok=True)
+    record = measure(given.trials)
+    (given.out / "mujoco.json").write_text(json.dumps(record, indent=1) + "\n")
