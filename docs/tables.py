@@ -4,6 +4,7 @@ It stands between ``<!-- table NAME -->``, ``<!-- text FILE -->`` or ``<!-- code
 ``<!-- end -->``. A test compares it with what would be written now.
 """
 
+import json
 import os
 import re
 import shlex
@@ -14,9 +15,9 @@ from pathlib import Path
 
 import numpy as np
 
-from kinarm import PROBLEMS, REWARD_TERMS, Arm, RewardWeights, Scene, Simulator
+from kinarm import PROBLEMS, REWARD_TERMS, Arm, Plant, RewardWeights, Scene, Simulator, plant_names
 from kinarm.__main__ import COMMANDS
-from kinarm._fields import summary_of
+from kinarm._fields import summary_of, to_plain
 from kinarm.contact_pairs import link_of
 from kinarm.enclosures import inner_capsule
 from kinarm.envs import ENVIRONMENTS
@@ -28,6 +29,7 @@ from kinarm.observation import OBSERVATION, part_slices
 from kinarm.policies import find_learner
 
 DOCS = Path(__file__).parent
+RESULTS = DOCS.parent / "data" / "results"
 
 SYMBOLS = {
     "n": "number of trials; of several training seeds, all their trials together",
@@ -206,7 +208,41 @@ def programs_table() -> str:
     return markdown_table(["to", "type"], rows)
 
 
+def plants_table() -> str:
+    """What the shipped plants set."""
+    rows = []
+    for name in plant_names():
+        entries = to_plain(Plant.load(name))
+        ranges = {key: " to ".join(map(str, np.ravel(value))) for key, value in entries.items()}
+        said = ", ".join(f"`{key}` {value}" for key, value in ranges.items())
+        rows.append([f"`{name}`", said or "nothing"])
+    return markdown_table(["plant", "settings"], rows)
+
+
+def servos_table() -> str:
+    """Success and contact of policies in kinarm and in MuJoCo, in percent, by plant."""
+    record = json.loads((RESULTS / "plants" / "mujoco.json").read_text(encoding="utf-8"))
+    names = list(record["rows"][0]["policies"])
+
+    def shares(figures: Mapping[str, list[float]]) -> str:
+        pairs = (figures[each] for each in ("kinarm", "mujoco"))
+        return ", ".join(f"{100 * success:.1f} / {100 * touched:.1f}" for success, touched in pairs)
+
+    rows = [
+        [
+            row["plant"],
+            f"{100 * row['apart']:.2f}",
+            *(shares(row["policies"][name]) for name in names),
+        ]
+        for row in record["rows"]
+    ]
+    heads = (f"`{name.removesuffix('-both-seed0')}`" for name in names)
+    return markdown_table(["plant", "apart %", *heads], rows)
+
+
 TABLES = {
+    "plants": plants_table,
+    "servos": servos_table,
     "arm": lambda: arm_table("paper"),
     "capsules": lambda: capsule_table("paper"),
     "arms": arms_table,

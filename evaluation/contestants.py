@@ -19,6 +19,7 @@ from kinarm.evaluation.predictors import Actor, Wrapper, run_remembering, run_wr
 from kinarm.evaluation.trials import TrialSet, trial_generator
 from kinarm.networks import Layer, Networks, PolicyFunction
 from kinarm.observation import observation_size
+from kinarm.plant import Plant
 from kinarm.policies.policy import Policy
 from kinarm.policies.provenance import normalization_remark
 from kinarm.problem import PROBLEMS, ReachProblem
@@ -214,8 +215,8 @@ def _run_random(trials: TrialSet, *, record: bool = False) -> Rollouts:
 
 
 def _run_oracle(trials: TrialSet, *, record: bool = False) -> Rollouts:
-    actions = oracle_bounds(trials).actions
-    return trials.simulator.rollout_actions(actions, trials.starts, trials.goals, record=record)
+    actions, ideal = oracle_bounds(trials).actions, trials.simulator.with_plant(Plant())
+    return ideal.rollout_actions(actions, trials.starts, trials.goals, record=record)
 
 
 BASELINES = {
@@ -225,7 +226,7 @@ BASELINES = {
 """Uniformly random actions, and no motion at all."""
 
 ORACLE = Contestant("oracle", _run_oracle, "oracle", "oracle")
-"""The motions that the oracle found, replayed."""
+"""The motions that the oracle found, replayed with joints that obey at once."""
 
 UNTRAINED = {**BASELINES, ORACLE.name: ORACLE}
 
@@ -237,7 +238,8 @@ def measure_holding(contestant: Contestant, trials: TrialSet) -> Holding:
         aimed = trials.with_tolerance(min(AIM, trials.problem.task.tolerance))
         actions = oracle_bounds(aimed).actions
         scenarios = (endless.starts, endless.goals)
-        rollouts = endless.simulator.rollout_actions(actions, *scenarios, record=True)
+        ideal = endless.simulator.with_plant(Plant())
+        rollouts = ideal.rollout_actions(actions, *scenarios, record=True)
     else:
         rollouts = contestant.run(endless, record=True)
     return Holding.of(rollouts, trials)

@@ -59,6 +59,11 @@ class FacedProblem(Document, frozen=True, kw_only=True):
     goals: list[tuple[float, float, float]]
     oracle: Bounds | None
 
+    @property
+    def changes(self) -> list[str]:
+        """Settings other than those of the shipped problem of that name."""
+        return ReachProblem.from_json(self.problem).changes
+
     @classmethod
     def of(cls, trials: TrialSet, bounds: OracleSolutions | None) -> "FacedProblem":
         """What was faced, with the bounds of the first trials, if known."""

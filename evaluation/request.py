@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, ClassVar
 from kinarm._files import absolute, check_output, only_writer, write_text
 from kinarm._tables import TableOptions
 from kinarm.errors import FROM_ZERO, TRIALS, InvalidInputError
-from kinarm.problem import problem_names
+from kinarm.problem_files import problem_names
 from kinarm.problem_options import ProblemOptions, say_choices
 
 if TYPE_CHECKING:

@@ -36,8 +36,8 @@ from .plant import Plant as Plant
 from .plant import plant_names as plant_names
 from .problem import PROBLEMS as PROBLEMS
 from .problem import ReachProblem as ReachProblem
-from .problem import problem_names as problem_names
-from .problem import scene_names as scene_names
+from .problem_files import problem_names as problem_names
+from .problem_files import scene_names as scene_names
 from .recording import Recording as Recording
 from .recording import load_recordings as load_recordings
 from .recording import record_path as record_path

@@ -42,6 +42,8 @@ class EpisodePlants:
         Takes numbers of plants, shape (n, width), and joint positions, shape (n, n_joints) [rad or
         m].
         """
+        if not self.width:
+            return np.zeros((0, 0, self._n_actions))
         calibration = plants[:, OFFSETS + self._n_actions : OFFSETS + 2 * self._n_actions]
         commands = q[:, : self._n_actions] - calibration
         drive = np.repeat(commands[:, None], self.rows, axis=1)

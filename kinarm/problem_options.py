@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, ClassVar, Literal
 from kinarm._fields import Checked, init_fields
 from kinarm.arm_specification import arm_names
 from kinarm.plant import plant_names
-from kinarm.problem import ProblemLike, ReachProblem, problem_names, scene_names
+from kinarm.problem import ProblemLike, ReachProblem
+from kinarm.problem_files import problem_names, scene_names
 
 if TYPE_CHECKING:
     from kinarm.arm import Arm

@@ -22,7 +22,8 @@ from kinarm.evaluation.trials import TrialSet, trial_set
 from kinarm.policies.mirror import find_mirror, missing_mirror
 from kinarm.policies.policy import Policy
 from kinarm.policies.provenance import package_versions, source_commit
-from kinarm.problem import ReachProblem, problem_names
+from kinarm.problem import ReachProblem
+from kinarm.problem_files import problem_names
 
 LEVELS = (0.5, 0.8, 0.9)
 """Shares of success by which the speed of learning is told."""

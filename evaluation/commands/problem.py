@@ -13,7 +13,8 @@ from kinarm._tables import print_table
 from kinarm.arm_specification import ArmSpecification, arm_names
 from kinarm.bodies import Point
 from kinarm.errors import FROM_ZERO, TRIALS, InvalidInputError
-from kinarm.problem import ReachProblem, problem_names
+from kinarm.problem import ReachProblem
+from kinarm.problem_files import problem_names
 from kinarm.problem_options import ProblemOptions, say_choices
 from kinarm.scene import Mount
 

@@ -73,8 +73,9 @@ class TrainingArms:
         self.reach_within(config.tolerance_at(done))
         begun = EpisodeStates._make(map(np.copy, state.episodes))
         scenarios, start, taken = (begun.q, begun.goal), begun.start, begun.steps
-        going_on = {"origins": start, "taken": taken, "drive": begun.drive}
-        self.episodes = self.simulator.reset(*scenarios, **going_on)
+        self.episodes = self.simulator.reset(
+            *scenarios, origins=start, taken=taken, drive=begun.drive
+        )
         self._total, self._start, self._replayed = begun.total, begun.start, begun.replayed
         self.failed, self.time = state.failed, 0.0
         self.returns: list[NDArray[np.float64]] = []

@@ -16,7 +16,8 @@ from typing import Any, NamedTuple
 
 from kinarm.arm_specification import arm_names
 from kinarm.policies.provenance import package_versions, source_commit
-from kinarm.problem import PROBLEMS, ReachProblem, problem_names
+from kinarm.problem import PROBLEMS, ReachProblem
+from kinarm.problem_files import problem_names
 
 from .steps import check_policies, check_steps
 from .tally import Tally, table

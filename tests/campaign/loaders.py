@@ -27,7 +27,8 @@ from kinarm.meshes import hulls_of_mesh
 from kinarm.policies import Demonstrations, Policy, load_checkpoint, recipe
 from kinarm.policies.conversion.models import load_vec_normalize, sb3_model
 from kinarm.policies.learners import state_policy
-from kinarm.problem import ReachProblem, find_scene, find_task
+from kinarm.problem import ReachProblem
+from kinarm.problem_files import find_scene, find_task
 from kinarm.recording import load_recordings
 from kinarm.viewer.visual_shapes import read_mesh_file, visual_parts
 

@@ -6,7 +6,8 @@ import pytest
 from matplotlib.image import imread
 from refusals import check_refused
 
-from kinarm.problem import PROBLEMS, ReachProblem, problem_names
+from kinarm.problem import PROBLEMS, ReachProblem
+from kinarm.problem_files import problem_names
 
 FREE = """
 [[scene.obstacles]]

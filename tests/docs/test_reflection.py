@@ -13,7 +13,8 @@ from kinarm.evaluation.trials import trial_set
 from kinarm.policies import load_policy, recipe, train_policy
 from kinarm.policies.mirror import missing_mirror
 from kinarm.policies.policy import Layer
-from kinarm.problem import PROBLEMS, ReachProblem, problem_names
+from kinarm.problem import PROBLEMS, ReachProblem
+from kinarm.problem_files import problem_names
 
 SHORT = {"iterations": 6, "episodes": 1, "directions": 4, "top_directions": 2}
 

@@ -11,7 +11,8 @@ from reference_episodes import compare_actions
 from kinarm.bodies import SHAPES, Body
 from kinarm.errors import KinarmError
 from kinarm.meshes import coal_shape
-from kinarm.problem import ReachProblem, find_scene
+from kinarm.problem import ReachProblem
+from kinarm.problem_files import find_scene
 from kinarm.scene import GoalRegion, Obstacle, Scene
 from kinarm.simulator import Simulator
 from kinarm.world import World

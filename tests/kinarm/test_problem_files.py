@@ -8,7 +8,8 @@ import pytest
 from kinarm._files import shipped_files
 from kinarm.arm import ArmSpecification
 from kinarm.errors import InvalidInputError, OutputError, ProblemError, UnknownNameError
-from kinarm.problem import PROBLEMS, ReachProblem, find_scene, find_task
+from kinarm.problem import PROBLEMS, ReachProblem
+from kinarm.problem_files import find_scene, find_task
 from kinarm.scene import GoalRegion, Obstacle, Scene
 from kinarm.task import ReachTask, RewardWeights
 from kinarm.world import World

@@ -21,7 +21,8 @@ from kinarm.policies.mirror import (
     problem_mirror,
 )
 from kinarm.policies.policy import Layer
-from kinarm.problem import PROBLEMS, ReachProblem, problem_names
+from kinarm.problem import PROBLEMS, ReachProblem
+from kinarm.problem_files import problem_names
 from kinarm.scene import GoalRegion, Mount, Obstacle, Scene
 from kinarm.simulator import Simulator
 from kinarm.world import World
