@@ -72,11 +72,10 @@ class ReferencePlant:
             self._change[axis] = change
             self._velocity[axis] += change
             way = part * (self._velocity[axis] - trapeze * change)
-            q = exact if change == free else q + way
-        q = float(np.clip(np.clip(q, start - limit, start + limit), lower, upper))
-        if not lower < q < upper:
-            self._velocity[axis] = self._change[axis] = 0.0
-        return q
+            q = np.clip(exact if change == free else q + way, lower, upper)
+            if not lower < q < upper:
+                self._velocity[axis] = self._change[axis] = 0.0
+        return float(np.clip(q, start - limit, start + limit))
 
     def seen(self, q: Array, step: int) -> tuple[Array, Array]:
         """Joint positions [rad or m] and goal [m] as they are seen after so many steps."""

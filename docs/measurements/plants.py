@@ -43,8 +43,8 @@ SETTINGS: Mapping[str, Mapping[str, Any]] = {
 SUBSTEP = 0.0005
 """Time step of MuJoCo [s]."""
 
-ARMATURE = 10.0
-"""Inertia of the geared motors [kg m2], beside links of 1 kg each."""
+ARMATURE = 100.0
+"""Inertia of the geared motors [kg m2]: links of 1 kg hardly move each other."""
 
 
 class ServoArm:
@@ -61,7 +61,7 @@ class ServoArm:
     def __init__(self, simulator: Simulator, count: int) -> None:
         self.simulator, plant = simulator, simulator.problem.plant
         model = self.model = mujoco.MjModel.from_xml_string(mjcf(simulator.world, SUBSTEP))
-        model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONTACT
+        model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONSTRAINT
         model.dof_armature[:] = ARMATURE
         self.states = [mujoco.MjData(model) for _ in range(count)]
         # Gains for what each joint moves at home.
@@ -86,10 +86,12 @@ class ServoArm:
     def move(self, commands: Array, running: Array) -> Array:
         """Joint positions on the way, shape (n, parts, n_actions) [rad or m], for commands.
 
-        Arms that are not ``running`` stay. Motors go at most as fast as joints are rated.
+        Arms that are not ``running`` stay. Motors go at most as fast as joints are rated,
+        and joints stop at their limits.
         """
         parts, time_step = 10, self.simulator.problem.stepping.time_step
         fastest = self.simulator.step_limit / time_step
+        limits = self.model.jnt_range.T
         ways = np.empty((len(commands), parts, self.model.nq))
         for row, (way, state) in enumerate(zip(ways, self.states, strict=True)):
             way[:] = state.qpos
@@ -97,7 +99,11 @@ class ServoArm:
             for part in range(parts if running[row] else 0):
                 for _ in range(round(time_step / SUBSTEP / parts)):
                     mujoco.mj_step(self.model, state)
-                    state.qvel[:] = np.clip(state.qvel, -fastest, fastest)
+                    speeds = np.clip(state.qvel, -fastest, fastest)
+                    within = np.clip(state.qpos + SUBSTEP * (speeds - state.qvel), *limits)
+                    state.qvel[:] = speeds
+                    state.qvel[(within == limits[0]) | (within == limits[1])] = 0.0
+                    state.qpos[:] = within
                 way[part] = state.qpos
         return ways
 

@@ -19,7 +19,7 @@ from kinarm.kernels.placing import FIRST, STEP, mixed, uniform
 from kinarm.kernels.session import Block
 from kinarm.plant import PlantDraws
 
-SUBSTEPS = 8
+SUBSTEPS = 5
 """Parts of a step in which limits of velocity, acceleration and jerk hold."""
 
 DELAY, RESOLUTION, NOISE, GOAL_NOISE, HIGH_BITS, LOW_BITS = range(6)
@@ -161,10 +161,10 @@ def move_joints(chain: Chain, rules: Rules, fresh: bool, block: Block) -> None:
                 change = select(jerk > 0.0, eased, change)
             velocity += change
             way = part * (velocity - plant[0, TRAPEZE] * change)
-            q = select(change == free, exact, q + way)
-        within = min(max(q, max(lower, start - limit)), min(upper, start + limit))
-        stopped = (within <= lower) | (within >= upper)
-        velocity, change = select(stopped, 0.0, velocity), select(stopped, 0.0, change)
+            q = min(max(select(change == free, exact, q + way), lower), upper)
+            stopped = (q <= lower) | (q >= upper)
+            velocity, change = select(stopped, 0.0, velocity), select(stopped, 0.0, change)
+        within = min(max(q, start - limit), start + limit)
         block.target[0, axis] = select(fresh, within, block.target[0, axis])
         drive[VELOCITY, axis] = select(fresh, velocity, drive[VELOCITY, axis])
         drive[CHANGE, axis] = select(fresh, change, drive[CHANGE, axis])

@@ -19,7 +19,7 @@ from kinarm.policies.normalizer import input_scale
 from kinarm.policies.ppo.arms import collect as collect_rollout
 from kinarm.policies.ppo.learner import PPOTraining
 from kinarm.policies.ppo.networks import split_parameters
-from kinarm.problem import PROBLEMS, ReachProblem, ReachProblem
+from kinarm.problem import PROBLEMS, ReachProblem
 from kinarm.simulator import Simulator
 from kinarm.task import RewardWeights
 
@@ -40,9 +40,6 @@ CONFIGS = {
     "replay": replace(TINY, replay_share=0.5, replay_size=10),
     "settling": replace(TINY, initial_tolerance=0.9, training_tolerance=0.2, final_log_std=-4.0),
     "stopping": replace(TINY, training_tolerance=0.9, stop_at_goal=True),
-    "plant": replace(
-        TINY, problem=ReachProblem.load("left").replace(plant="hard"), training_tolerance=0.3
-    ),
     "plant": replace(
         TINY, problem=ReachProblem.load("left").replace(plant="hard"), training_tolerance=0.3
     ),
