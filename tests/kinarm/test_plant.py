@@ -155,7 +155,9 @@ def test_commanded_positions_are_seen_in_place_of_measured_ones():
     [{}, {"feedback": "commanded"}, {"bandwidth": 0.0, "jerk": (2e3, 2e4)}, {"order": 1}],
 )
 def test_rollouts_equal_the_reference(change):
-    simulator, rng = simulator_with(**{**EVERYTHING, **change}), np.random.default_rng(3)
+    problem = ReachProblem.load("right").replace(tested_configurations=4)
+    simulator = Simulator(problem, threads=1).with_plant(Plant(**{**EVERYTHING, **change}))
+    rng = np.random.default_rng(3)
     starts, goals = simulator.sample(rng, 12)
     actions = held_actions(simulator, rng, 12)
     rollouts = simulator.rollout_actions(actions, starts, goals, record=True)
