@@ -27,9 +27,6 @@ from kinarm.contact_shapes import ContactShapes
 from kinarm.meshes import coal_shape
 from kinarm.scene import Scene
 
-FEW = 4
-"""Of up to so many steps in doubt, Coal tells what touches."""
-
 
 class Contact(NamedTuple):
     """Two bodies that touch.
@@ -266,47 +263,6 @@ class ContactModel:
             return None
         # Pairs are tested in order up to the first in contact; later results are of other calls.
         return next(index for index, result in enumerate(results) if result.isCollision())
-
-    def first_contacts(
-        self,
-        ways: NDArray[np.float64],
-        doubt: NDArray[np.int64],
-        scenes: NDArray[np.float64],
-    ) -> tuple[NDArray[np.int64], int]:
-        """Find what steps touch first that are proven neither free nor in contact.
-
-        Coal is asked in the order of the motion, up to the first contact.
-
-        Parameters
-        ----------
-        ways : ndarray, shape (n, n_tested, n_joints)
-            Configurations in the order of the motion [rad or m].
-        doubt : ndarray of int, shape (n,)
-            Bit k set: configuration k, from 0, is in doubt.
-        scenes : ndarray, shape (n, n_tested, n_placed, 16)
-            Rows of bodies as in ``shapes.placed``; empty if they always rest
-            where the model has them.
-
-        Returns
-        -------
-        touched : ndarray of int, shape (n,)
-            Numbers of pairs, from 1; -1 for unknown ones, 0 without contact.
-        asked : int
-            Configurations that Coal was asked about.
-        """
-        touched, asked = np.zeros(len(ways), dtype=np.int64), 0
-        for k in range(ways.shape[1]):
-            rows = np.flatnonzero((doubt & 1 << k != 0) & (touched == 0))
-            if rows.size:
-                there = scenes[rows, k] if len(scenes) else scenes
-                hit = rows[self.touching(ways[rows, k], there)]
-                touched[hit] = -1
-                asked += rows.size
-                for row in hit if len(ways) <= FEW else ():
-                    model = self.at(scenes[row, k]) if len(scenes) else self
-                    index = model.first_in_contact(ways[row, k])
-                    touched[row] = -1 if index is None else index + 1
-        return touched, asked
 
     def __reduce__(self) -> tuple[type, tuple[object, ...]]:
         return type(self), tuple(getattr(self, item.name) for item in fields(self))

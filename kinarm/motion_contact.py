@@ -1,4 +1,4 @@
-"""Contact at any time of a straight motion, by distances that Coal measures.
+"""Contact of steps by Coal: at configurations, or at any time of a straight motion, by distances.
 
 An interval of the motion is free if the pairs are farther apart in its middle than they can move in
 half of it; else it is halved.
@@ -11,7 +11,7 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from kinarm.collision import Contact, ContactModel, Step
-from kinarm.episodes import INTERVALS
+from kinarm.episodes import Rules
 from kinarm.kernels.compiling import Array
 
 TOUCHING, TOLD_APART = 1e-6, 2.5e-7
@@ -35,32 +35,35 @@ def contact_in_motion(step: Step) -> Contact | None:
     return contact
 
 
-def motions_in_contact(
-    steps: Iterable[Step], doubt: NDArray[np.int64]
-) -> tuple[NDArray[np.int64], int]:
-    """Find which steps touch something; results are those of `ContactModel.first_contacts`.
+def steps_in_contact(
+    steps: Iterable[Step], doubt: NDArray[np.int64], rules: Rules
+) -> tuple[NDArray[np.bool_], int]:
+    """Find which steps touch something, and how many configurations were asked.
 
     Parameters
     ----------
     steps : iterable of Step
         The steps.
     doubt : ndarray of int, shape (n,)
-        Bit k set: interval k, from 0, of `INTERVALS` is in doubt.
+        Bit k set: part k, from 0, of the step is in doubt.
+    rules : Rules
+        Which say whether configurations are tested or intervals.
     """
-    touched, asked = np.zeros(len(doubt), dtype=np.int64), 0
+    touching, asked, parts = np.zeros(len(doubt), dtype=bool), 0, rules.parts
     for row, step in enumerate(steps):
-        open_parts = np.flatnonzero(doubt[row] >> np.arange(INTERVALS) & 1).tolist()
+        open_parts = np.flatnonzero(doubt[row] >> np.arange(parts) & 1).tolist()
         # Mostly the end of the last interval tells.
-        model, end = step.at((open_parts[-1] + 1) / INTERVALS)
-        hit = model.first_in_contact(end) is not None
-        asked += 1
-        for k in open_parts:
-            if hit:
+        for k in open_parts if rules.tested else open_parts[-1:]:
+            model, end = step.at((k + 1) / parts)
+            touching[row], asked = model.first_in_contact(end) is not None, asked + 1
+            if touching[row]:
                 break
-            share, more = first_share(step, k / INTERVALS, (k + 1) / INTERVALS)
-            hit, asked = share is not None, asked + more
-        touched[row] = -1 if hit else 0
-    return touched, asked
+        for k in () if rules.tested or touching[row] else open_parts:
+            share, more = first_share(step, k / parts, (k + 1) / parts)
+            touching[row], asked = share is not None, asked + more
+            if touching[row]:
+                break
+    return touching, asked
 
 
 def first_share(step: Step, low: float, high: float) -> tuple[float | None, int]:

@@ -342,17 +342,13 @@ class Simulator:
     def _decide(self, session: Session, paused: NDArray[np.int64]) -> NDArray[np.int64]:
         """Let Coal refuse steps in doubt; return which episodes go on."""
         episodes = session.episodes
-        touched, asked = self.world.first_contacts(episodes, paused)
+        refused, asked = self.world.decided(episodes, paused)
         self.checked_by_coal += asked
-        refused = touched != 0
         resumed: NDArray[np.int64] = paused[~refused]
-        episodes.touched[paused] = touched
         episodes.status[resumed] = RUNNING
         episodes.cleared[paused] = ~refused
         if refused.any():
             refuse(paused[refused], session)
-            # Only contact as such is known of these.
-            episodes.touched[paused[touched < 0]] = 0
         return resumed
 
     @one_torch_thread()

@@ -9,7 +9,7 @@ from kinarm.collision import Contact, ContactModel, Step
 from kinarm.episodes import Episodes, Rules
 from kinarm.errors import finite_array, whole_number
 from kinarm.kernels.compiling import Array
-from kinarm.motion_contact import contact_in_motion, motions_in_contact
+from kinarm.motion_contact import contact_in_motion, steps_in_contact
 from kinarm.problem import ReachProblem
 
 
@@ -54,7 +54,7 @@ class StepContact:
         """Describe the first contact of a step of `steps_of`, or return None."""
         if self.rules.tested == 0:
             return contact_in_motion(step)
-        asked = (step.at(share) for share in self._shares.tolist())
+        asked = (step.at(k / self.rules.tested) for k in range(1, self.rules.tested + 1))
         contacts = (model.contact(q) for model, q in asked)
         return next((contact for contact in contacts if contact), None)
 
@@ -92,19 +92,11 @@ class StepContact:
         rows[:, moving, 13:] += self.problem.body_offsets(taken)
         return rows
 
-    def first_contacts(
-        self, episodes: Episodes, rows: NDArray[np.int64]
-    ) -> tuple[NDArray[np.int64], int]:
-        """Let Coal decide about the steps of some episodes.
-
-        See `kinarm.collision.ContactModel.first_contacts`.
-        """
-        motions, doubt = (episodes.q[rows], episodes.target[rows]), episodes.doubt[rows]
-        scenes, taken = episodes.scenes_at(rows), episodes.steps[rows]
-        if self.rules.tested == 0:
-            return motions_in_contact(self.steps_of(*motions, scenes, taken), doubt)
-        there = self.substeps(self.moved(scenes, taken), self.moved(scenes, taken + 1))
-        return self.contact_model.first_contacts(self.substeps(*motions), doubt, there)
+    def decided(self, episodes: Episodes, rows: NDArray[np.int64]) -> tuple[NDArray[np.bool_], int]:
+        """Let Coal decide about the steps of some episodes; see `steps_in_contact`."""
+        bodies = episodes.scenes_at(rows), episodes.steps[rows]
+        steps = self.steps_of(episodes.q[rows], episodes.target[rows], *bodies)
+        return steps_in_contact(steps, episodes.doubt[rows], self.rules)
 
     def contact_pair(
         self, configuration: ArrayLike, target: ArrayLike | None = None, *, step: int = 0
@@ -112,21 +104,3 @@ class StepContact:
         """Names of the bodies of what `contact` describes, or None."""
         contact = self.contact(configuration, target, step=step)
         return contact.pair if contact else None
-
-    def substeps(self, configurations: Array, targets: Array) -> Array:
-        """Configurations at which a step is tested for contact, or between which all of it is.
-
-        Takes ends of steps, shape (n, n_joints), and returns evenly spaced configurations, shape
-        (n, n_parts, n_joints), of which the last is the target [rad or m]; likewise for rows of
-        bodies.
-        """
-        shares = self._shares.reshape(-1, *[1] * (targets.ndim - 1))
-        ways = configurations[:, None] + shares * (targets - configurations)[:, None]
-        ways[:, -1] = targets
-        return ways
-
-    @property
-    def _shares(self) -> Array:
-        """Shares of a step at which it is tested."""
-        shares: Array = np.arange(1, self.rules.parts + 1) / self.rules.parts
-        return shares

@@ -23,6 +23,7 @@ from kinarm._files import write_text
 from kinarm.evaluation.report.templating import markdown_table
 from kinarm.evaluation.statistics import share_over_seeds
 from kinarm.reference import SAMPLES, ReferenceSimulator
+from tests.helpers.configurations import substeps
 from tests.helpers.random_scenes import random_scene
 from tests.helpers.reference_episodes import assert_equal_outcome, held_actions, scripted
 
@@ -120,7 +121,7 @@ def check_steps(arm: str, rng: np.random.Generator, size: int) -> Checked:
         if world.screened(start + shares * (end - start))[1].any():
             case = {"start": start.tolist(), "end": end.tolist()}
             cases.append({"problem": world.problem.to_json(), **case})
-    quarters = world.substeps(did.starts[refused], did.targets[refused])[:, 3::4]
+    quarters = substeps(world, did.starts[refused], did.targets[refused])[:, 3::4]
     seen = [world.screened(way)[1].any() for way in quarters]
     return free.sum(), {"refused": len(seen), "unseen by four": seen.count(False)}, cases
 

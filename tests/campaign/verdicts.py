@@ -6,7 +6,7 @@ from numpy.typing import NDArray
 from kinarm.problem import ReachProblem
 from kinarm.simulator import Simulator
 from kinarm.world import World
-from tests.helpers.configurations import contact_boundary, jittered
+from tests.helpers.configurations import contact_boundary, jittered, substeps
 
 from .engines import MARGIN, SecondEngine, is_fit
 from .tally import Tally
@@ -84,7 +84,7 @@ def _tested_in_episodes(
         refused = (step == last) & done.collision[:, None]
         ends[refused] = done.targets[done.collision]
         taken = step <= last
-        ways = simulator.world.substeps(done.paths[:, :-1][taken], ends[taken])
+        ways = substeps(simulator.world, done.paths[:, :-1][taken], ends[taken])
         parts.append(_check_ways(tally, simulator, ways, refused[taken]))
     return np.concatenate(parts)
 
@@ -101,7 +101,7 @@ def _tested_from(
     episodes = simulator.reset(starts, np.full((len(starts), 3), 10.0))  # nothing reaches it
     actions = size * rng.normal(size=(len(starts), simulator.n_actions))
     refused = simulator.step(episodes, actions).collision
-    ways = simulator.world.substeps(starts, episodes.target)
+    ways = substeps(simulator.world, starts, episodes.target)
     tally.count("near contact", ways.shape[0] * ways.shape[1])
     return _check_ways(tally, simulator, ways, refused)
 

@@ -23,6 +23,14 @@ def contact_boundary(simulator, seed, count, halvings=34):
     return free, hit
 
 
+def substeps(world, starts, ends):
+    """Ends of the parts of steps, at which they are tested, shape (n, n_parts, n_joints)."""
+    shares = np.arange(1, world.rules.parts + 1)[:, None] / world.rules.parts
+    ways = starts[:, None] + shares * (ends - starts)[:, None]
+    ways[:, -1] = ends
+    return ways
+
+
 def pair_distances(world, configurations):
     """Distances of all tested pairs as Coal finds them, shape (n, n_pairs) [m]."""
     model, geometry = world.arm.model, world.contact_model.geometry

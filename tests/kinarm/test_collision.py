@@ -3,7 +3,7 @@
 import numpy as np
 import pinocchio as pin
 import pytest
-from configurations import contact_boundary, depths, jittered, random_configurations
+from configurations import contact_boundary, depths, jittered, random_configurations, substeps
 from simulators import changed
 
 from kinarm.arm import Arm
@@ -203,7 +203,7 @@ class TestStepProof:
         starts, actions = steps_near_contact(any_simulator, 47, 1000)
         episodes, _ = doubted_steps(any_simulator, starts, actions)
         refused = episodes.status == COLLISION
-        ways = any_simulator.world.substeps(starts, episodes.target)[refused]
+        ways = substeps(any_simulator.world, starts, episodes.target)[refused]
         contacts = any_simulator.world.contact_model
         for way, number in zip(ways, episodes.touched[refused], strict=True):
             found = [contacts.first_in_contact(q) for q in way]
@@ -212,7 +212,7 @@ class TestStepProof:
     def test_flags_every_tested_configuration_that_touches(self, any_simulator):
         starts, actions = steps_near_contact(any_simulator, 11, 3000)
         episodes, doubted = doubted_steps(any_simulator, starts, actions)
-        tested = any_simulator.world.substeps(starts, episodes.target)
+        tested = substeps(any_simulator.world, starts, episodes.target)
         for k in range(4):
             touching = any_simulator.world.contact_model.in_contact(tested[:, k])
             assert not (touching & ~doubted[:, k]).any()
@@ -223,7 +223,7 @@ class TestStepProof:
         other = changed(simulator, tested_configurations=n, time_step=0.1)
         starts, actions = steps_near_contact(other, 19, 1500)
         episodes, doubted = doubted_steps(other, starts, actions)
-        tested = other.world.substeps(starts, episodes.target)
+        tested = substeps(other.world, starts, episodes.target)
         touching = other.world.contact_model.in_contact(tested.reshape(-1, 6)).reshape(-1, n)
         assert not (touching & ~doubted).any()
         assert touching.any(axis=0).all()
@@ -233,14 +233,14 @@ class TestStepProof:
         starts, goals = any_simulator.sample(rng, 600)
         actions = np.repeat(rng.uniform(-1, 1, (600, 8, any_simulator.n_actions)), 8, axis=1)
         rollouts = any_simulator.rollout_actions(actions, starts, goals, record=True)
-        ask = any_simulator.world.contact_model.in_contact
-        substeps = any_simulator.world.substeps
+        world = any_simulator.world
+        ask = world.contact_model.in_contact
         moves = rollouts.steps - rollouts.collision
         for path, count in zip(rollouts.paths, moves, strict=True):
             if count:
-                tested = substeps(path[:count], path[1 : count + 1])
+                tested = substeps(world, path[:count], path[1 : count + 1])
                 assert not ask(tested.reshape(-1, path.shape[1])).any()
-        refused = substeps(rollouts.configurations, rollouts.targets)[rollouts.collision]
+        refused = substeps(world, rollouts.configurations, rollouts.targets)[rollouts.collision]
         assert rollouts.collision.sum() > 20
         assert all(ask(tested).any() for tested in refused)
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from configurations import contact_boundary, random_configurations
+from configurations import contact_boundary, random_configurations, substeps
 
 from kinarm.errors import InvalidInputError, UnknownNameError
 from kinarm.problem import ReachProblem
@@ -78,7 +78,7 @@ class TestContact:
     def test_first_on_the_way_is_described(self, simulator):
         world = simulator.world
         contact = world.contact(np.zeros(6), FALLING)
-        tested = world.substeps(np.zeros((1, 6)), FALLING[None])[0]
+        tested = substeps(world, np.zeros((1, 6)), FALLING[None])[0]
         touching = world.contact_model.in_contact(tested)
         first = tested[touching.argmax()]
         np.testing.assert_array_equal(contact.configuration, first)
@@ -98,13 +98,3 @@ class TestContact:
         assert found[1] is None
         assert "post" in found[2]
         assert "post" in found[16]
-
-
-@pytest.mark.parametrize("n", [1, 5, 32])
-def test_tested_configurations_are_evenly_spaced_and_end_at_the_target(simulator, n):
-    world = World(simulator.problem.replace(tested_configurations=n))
-    q, target = random_configurations(simulator, 5, 14).reshape(2, 7, 6)
-    tested = world.substeps(q, target)
-    expected = np.linspace(q, target, n + 1, axis=1)[:, 1:]
-    np.testing.assert_allclose(tested, expected, rtol=0, atol=1e-14)
-    np.testing.assert_array_equal(tested[:, -1], target)

@@ -14,7 +14,7 @@ from kinarm.body_motion import BodyMotion
 from kinarm.collision import Step
 from kinarm.episodes import INTERVALS
 from kinarm.kernels.proof import MARGIN, SURE_FREEDOM, open_parts
-from kinarm.motion_contact import first_share, motions_in_contact
+from kinarm.motion_contact import first_share, steps_in_contact
 from kinarm.problem import PROBLEMS
 from kinarm.scene import Scene
 from kinarm.simulator import Simulator
@@ -135,8 +135,8 @@ def test_intervals_in_doubt_are_looked_at_to_their_ends(hanging):
         moves, lowest = np.ones((3, 3)), (parts - 1 + near) / INTERVALS
         ends = dipping(0.0, moves, lowest, np.full(3, 0.5e-6))
         steps = [Step(simulator.world.contact_model, *each) for each in zip(*ends, strict=True)]
-        for open_part, expected in ((parts, -1), (parts - np.sign(near - 0.5).astype(int), 0)):
+        for open_part, expected in ((parts, True), (parts + (1 if near > 0.5 else -1), False)):
             kept = (open_part > 0) & (open_part <= INTERVALS)
             chosen = [step for step, is_kept in zip(steps, kept, strict=True) if is_kept]
-            touched, _ = motions_in_contact(chosen, 1 << (open_part[kept] - 1))
+            touched, _ = steps_in_contact(chosen, 1 << (open_part[kept] - 1), simulator.world.rules)
             assert (touched == expected).all()
