@@ -64,13 +64,14 @@ class Part(NamedTuple):
 
     @property
     def problem(self) -> ReachProblem:
-        """The problem whose episodes are looked at."""
+        """The problem whose episodes are looked at, tested at four configurations a step."""
+        discrete = PROBLEMS["both"].replace(tested_configurations=4)
         if self.name in problem_names():
-            return ReachProblem.load(self.name)
+            return ReachProblem.load(self.name).tested_as(discrete)
         if self.name in SHIPPED:
-            return PROBLEMS["both"].replace(arm=self.name)
+            return discrete.replace(arm=self.name)
         scene = "desk" if self.name.startswith("so") else "benches"
-        return PROBLEMS["both"].replace(arm=self.name, scene=scene, time_step=0.04)
+        return discrete.replace(arm=self.name, scene=scene, time_step=0.04)
 
 
 def parts(share: float) -> list[Part]:
