@@ -18,7 +18,7 @@ from kinarm.evaluation.outcomes import Holding
 from kinarm.evaluation.predictors import Actor, Wrapper, run_remembering, run_wrapped
 from kinarm.evaluation.trials import TrialSet, trial_generator
 from kinarm.networks import Layer, Networks, PolicyFunction
-from kinarm.observation import observation_size
+from kinarm.observation_layout import ObservationLayout, observation_layout
 from kinarm.plant import Plant
 from kinarm.policies.policy import Policy
 from kinarm.policies.provenance import normalization_remark
@@ -115,16 +115,22 @@ class Contestant:
             return trained_for.covers(problem)
         return trained_for.digest == problem.digest
 
-    def check(self, arm: Arm, *, allow_other_arm: bool = False) -> None:
-        """Check that the policy, if any, fits an arm and was trained for it."""
+    def check(self, problem: ReachProblem, arm: Arm, *, allow_other_arm: bool = False) -> None:
+        """Check that the policy, if any, fits a problem's observation and arm, which it knows."""
         if self.policy is None:
             return
         if not allow_other_arm:
             self.policy.check_arm(arm)
         if self.wrapped:
             return
+        own, shown = map(observation_layout, (self.policy.problem, problem))
+        if own != shown:
+            raise PolicyFileError(
+                f"policy {self.name!r} sees other observations, {own!r}, than problem "
+                f"{problem.name!r} shows, {shown!r}"
+            )
         widths = (self.policy.n_observations, self.policy.n_actions)
-        expected = (observation_size(arm.n_joints), arm.n_actuated)
+        expected = (ObservationLayout.of(problem, arm).size, arm.n_actuated)
         if widths != expected:
             raise PolicyFileError(
                 "policy {!r} maps {} observations to {} actions; arm {!r} has {} and {}".format(

@@ -240,7 +240,8 @@ def evaluate(
     if faced is None:
         raise InvalidInputError(f"{contestant.name!r} was not trained for a problem: name one")
     drawn = TrialSet.draw(ReachProblem.load(faced).replace(**overrides), trials, seed)
-    contestant.check(drawn.simulator.arm, allow_other_arm=allow_other_arm)
+    simulator = drawn.simulator
+    contestant.check(simulator.problem, simulator.arm, allow_other_arm=allow_other_arm)
     bounds = oracle_bounds(drawn.first(MOST_BOUNDED)) if oracle else None
     return run_trials(contestant, drawn, bounds=bounds, hold=hold)
 

@@ -248,7 +248,8 @@ class EvaluationRequest(ProblemOptions, TableOptions):
         problems = {problem.name: problem for _, problem in pairs}
         arms = {name: problem.load_arm() for name, problem in problems.items()}
         for contestant, problem in pairs:
-            contestant.check(arms[problem.name], allow_other_arm=self.allow_other_arm)
+            arm = arms[problem.name]
+            contestant.check(problem, arm, allow_other_arm=self.allow_other_arm)
         if self.card is not None:
             from kinarm.evaluation.report.card import check_card
 

@@ -9,6 +9,7 @@ from .bodies import RandomBodies as RandomBodies
 from .body_motion import BodyMotion as BodyMotion
 from .clearance import Clearance as Clearance
 from .collision import Contact as Contact
+from .envs import ExtraObservation as ExtraObservation
 from .envs import ReachEnv as ReachEnv
 from .envs import ReachGoalEnv as ReachGoalEnv
 from .envs import ReachGoalVectorEnv as ReachGoalVectorEnv
@@ -32,6 +33,7 @@ from .networks import CompiledPolicy as CompiledPolicy
 from .networks import Layer as Layer
 from .networks import Mirror as Mirror
 from .networks import Networks as Networks
+from .observation_choice import Observation as Observation
 from .plant import Plant as Plant
 from .plant import plant_names as plant_names
 from .problem import PROBLEMS as PROBLEMS

@@ -1,6 +1,6 @@
 """Flat arrays of polytopes and capsules around what may touch, for proofs."""
 
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
 from itertools import product
 from typing import NamedTuple
 
@@ -223,6 +223,19 @@ def unit_body(body: Body) -> UnitBody:
         return UnitBody(WITH_BOX, False, prism(1.0, 1.0), size, 0.0, np.inf)
     corners = np.array([AXIS[:3], AXIS[3:6]])
     return UnitBody(BETWEEN_CAPSULES, True, corners, (0.0, 0.0, length / 2), radius)
+
+
+def unit_boxes(bodies: Sequence[Body]) -> Array:
+    """Middle and half-size of a box around each body before its size, shape (n, 2, 3)."""
+    boxes = np.zeros((len(bodies), 2, 3))
+    for box, body in zip(boxes, bodies, strict=True):
+        unit = unit_body(body)
+        corners = CUBE if body.shape == "cylinder" else np.array(body.vertices or unit.corners)
+        low, high = corners.min(axis=0), corners.max(axis=0)
+        box[:] = (low + high) / 2, (high - low) / 2
+        if body.shape == "mesh":
+            box[1] -= unit.rounding
+    return boxes
 
 
 def placed_row(body: Body, unit: UnitBody) -> Array:

@@ -8,7 +8,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kinarm.kernels.compiling import Array
-from kinarm.observation import GOAL_SIDE
 from kinarm.task import REWARD_TERMS
 
 INTERVALS = 16
@@ -43,6 +42,12 @@ class Rules(NamedTuple):
         they move straight.
     time_step, commanded
         Duration of a step [s]; and whether a plant feeds back its command.
+    shown, width : ndarray of int, shape (n_parts, 2), and int
+        First entry of each part in the observation of a step, and how often
+        it is there, 0 if not; and entries of that observation.
+    boxes : ndarray, shape (n_placed, 2, 3)
+        Middle and half-size of a box around each body of the scene, before its
+        size.
     """
 
     step_limit: Array
@@ -53,6 +58,9 @@ class Rules(NamedTuple):
     moves: Array
     time_step: float
     commanded: int
+    shown: NDArray[np.uint32]
+    width: int
+    boxes: Array
 
     @property
     def parts(self) -> int:
@@ -87,7 +95,7 @@ class Control(NamedTuple):
     activations: NDArray[np.int64] = np.zeros(0, dtype=np.int64)
     observation_signs: Array = np.zeros(0)
     action_signs: Array = np.zeros(0)
-    side: int = GOAL_SIDE
+    side: int = 0
     actions: Array = np.zeros((0, 0, 0))
 
 

@@ -16,7 +16,6 @@ from kinarm.episodes import Control
 from kinarm.errors import InvalidInputError, UnknownNameError, finite_array
 from kinarm.kernels.compiling import Array
 from kinarm.kernels.network import LEAK
-from kinarm.observation import GOAL_SIDE
 
 
 @runtime_checkable
@@ -56,14 +55,15 @@ class Layer(NamedTuple):
 
 
 class Mirror(NamedTuple):
-    """Signs of observations and actions in the reflection y -> -y."""
+    """Signs of observations and actions in the reflection y -> -y, and where the goal's y is."""
 
     observations: Array
     actions: Array
+    side: int = 1
 
     def on_the_left(self, observations: Array) -> NDArray[np.bool_]:
         """Which observations, shape (n, n_observations), have a goal on the left."""
-        return observations[:, GOAL_SIDE] > 0
+        return observations[:, self.side] > 0
 
     def from_the_right(self, observations: Array) -> Array:
         """Reflect observations, shape (n, n_observations), of goals on the left."""
@@ -165,7 +165,9 @@ class Networks:
     @property
     def form(self) -> tuple[object, ...]:
         """All but the weights, to compare."""
-        signs = () if self.mirror is None else (tuple(part.tolist()) for part in self.mirror)
+        signs = (
+            () if self.mirror is None else (tuple(np.ravel(part).tolist()) for part in self.mirror)
+        )
         return self.widths, self.activations, tuple(signs)
 
 
@@ -242,8 +244,9 @@ def network_control(
     if networks.mirror is None:
         return control
     # Copies are writable: kernels are compiled anew for read-only arrays.
-    signs, action_signs = map(np.array, networks.mirror)
-    return control._replace(observation_signs=signs, action_signs=action_signs)
+    signs, action_signs = map(np.array, networks.mirror[:2])
+    side = networks.mirror.side
+    return control._replace(observation_signs=signs, action_signs=action_signs, side=side)
 
 
 def checked_activations(given: Sequence[Activation], n_layers: int) -> tuple[Activation, ...]:

@@ -1,31 +1,44 @@
 """The observation: its parts in a table, each with its formula.
 
-A new part is a function that writes it and an entry of `OBSERVATION`; all else follows. Policies of
-another layout are refused.
+A new part is a function that writes it and an entry of `OBSERVATION`; all else follows. A problem
+chooses some (`kinarm.Observation`). Policies of another layout are refused.
 """
 
 from collections.abc import Callable, Sequence
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike
 
-from kinarm.kernels.compiling import Array, Vector, inlined
+from kinarm.errors import LARGEST
+from kinarm.kernels.compiling import Array, inlined
+from kinarm.kernels.elementary import sine_cosine
+from kinarm.kernels.plant import COMMAND
+from kinarm.kernels.session import Session
+from kinarm.kernels.surroundings import NEAR, Seen, write_obstacles, write_proximity
+from kinarm.scene import Scene
+
+if TYPE_CHECKING:
+    from kinarm.arm import Arm
 
 VERSION = 1
 """To be raised when a part's meaning changes, but not its name and length."""
+
+ONCE, JOINTS, ACTUATED, SLOTS = "", "n", "a", "k"
+"""What has a part: the arm, each joint, each actuated joint, or each slot for a body."""
 
 
 class Ranges(NamedTuple):
     """Ranges of the entries of an observation in a problem.
 
-    A box of all goals with tolerance, and a bound on the distance from the world's origin to any
-    point of the arm [m].
+    A box of all goals with tolerance, a bound on the distance from the world's origin to any point
+    of the arm [m], and the joints' limits [rad or m].
     """
 
     goal_lower: Array
     goal_upper: Array
     reach: float
+    lower: Array
+    upper: Array
 
 
 class Part(NamedTuple):
@@ -36,13 +49,17 @@ class Part(NamedTuple):
     name, meaning, unit : str
         Its name in layouts, and its meaning for people.
     signs : tuple of int
-        Signs of its entries in the reflection y -> -y.
+        Signs of its entries in the reflection y -> -y; 0 for that of the joint.
     bounds : callable
         From `Ranges` to lowest and highest values of its entries.
     write : callable
         Formula; see `write_goal`.
-    per_joint, of_goal : bool
-        Whether each joint has one, and whether it depends on the goal.
+    of : str
+        What has one: `ONCE`, `JOINTS`, `ACTUATED` or `SLOTS`.
+    of_goal : bool
+        Whether it depends on the goal.
+    lacks : callable
+        From arm and scene to why they cannot have it, or an empty text.
     """
 
     name: str
@@ -50,72 +67,120 @@ class Part(NamedTuple):
     unit: str
     signs: tuple[int, ...]
     bounds: Callable[[Ranges], tuple[Array | float, Array | float]]
-    write: Callable[[Array, Vector, Array, int, int, Array, int], None]
-    per_joint: bool = False
+    write: Callable[[Session, Seen, int, int], None]
+    of: str = ONCE
     of_goal: bool = False
-
-    def length(self, n_joints: int) -> int:
-        """Number of its entries for an arm."""
-        return len(self.signs) * (n_joints if self.per_joint else 1)
-
-    def repeated(self, values: ArrayLike, n_joints: int) -> Array:
-        """Values of its entries, or one for all, for every joint."""
-        once = np.broadcast_to(np.asarray(values, dtype=np.float64), len(self.signs))
-        return np.tile(once, self.length(n_joints) // len(self.signs))
+    lacks: Callable[["Arm", Scene], str] = lambda *_: ""
 
 
 @inlined
-def write_goal(
-    poses: Array, tool: Vector, goals: Array, e: int, k: int, observations: Array, start: int
-) -> None:
+def write_goal(session: Session, seen: Seen, start: int, count: int) -> None:
     """Position of the goal.
 
     Parameters
     ----------
-    poses : ndarray, shape (n_joints + 1, POSE)
-        Forward kinematics; see `kinarm.kernels.kinematics.forward_kinematics`.
-    tool, goals
-        The tool point, and goal points, shape (n_episodes, 3), in the world
-        [m].
-    e, k : int
-        Episode, and joint from 1; 0 if the part is not per joint.
-    observations, start
-        Table, shape (n_episodes, n_observations), and the part's first entry.
+    session, seen : Session and Seen
+        What the step is made of, and what is seen after it. The observation,
+        ``session.block.observation``, has the shape (1, n_observations).
+    start, count : int
+        The part's first entry, and how often it is there, one after the other.
     """
     for i in range(3):
-        observations[e, start + i] = goals[e, i]
+        session.block.observation[0, start + i] = seen.goal[0, i]
 
 
 @inlined
-def _write_offset(
-    poses: Array, tool: Vector, goals: Array, e: int, k: int, observations: Array, start: int
-) -> None:
+def _write_offset(session: Session, seen: Seen, start: int, count: int) -> None:
     """Goal minus tool point."""
-    observations[e, start] = goals[e, 0] - tool[0]
-    observations[e, start + 1] = goals[e, 1] - tool[1]
-    observations[e, start + 2] = goals[e, 2] - tool[2]
+    session.block.observation[0, start] = seen.goal[0, 0] - seen.tool[0]
+    session.block.observation[0, start + 1] = seen.goal[0, 1] - seen.tool[1]
+    session.block.observation[0, start + 2] = seen.goal[0, 2] - seen.tool[2]
 
 
 @inlined
-def _write_orientation(
-    poses: Array, tool: Vector, goals: Array, e: int, k: int, observations: Array, start: int
-) -> None:
-    """Orientation of a joint frame."""
-    for i in range(4):
-        observations[e, start + i] = poses[k, i]
+def _write_orientations(session: Session, seen: Seen, start: int, count: int) -> None:
+    """Orientations of the joint frames."""
+    for k in range(count):
+        for i in range(4):
+            session.block.observation[0, start + 4 * k + i] = seen.frames[k + 1, i]
 
 
 @inlined
-def _write_position(
-    poses: Array, tool: Vector, goals: Array, e: int, k: int, observations: Array, start: int
-) -> None:
-    """Position of a joint frame."""
-    for i in range(3):
-        observations[e, start + i] = poses[k, 13 + i]
+def _write_positions(session: Session, seen: Seen, start: int, count: int) -> None:
+    """Positions of the joint frames."""
+    for k in range(count):
+        for i in range(3):
+            session.block.observation[0, start + 3 * k + i] = seen.frames[k + 1, 13 + i]
+
+
+@inlined
+def _write_joints(session: Session, seen: Seen, start: int, count: int) -> None:
+    """Joint positions."""
+    for k in range(count):
+        session.block.observation[0, start + k] = seen.joints[0, k]
+
+
+@inlined
+def _write_angles(session: Session, seen: Seen, start: int, count: int) -> None:
+    """Sine and cosine of the joint angles."""
+    for k in range(count):
+        sine, cosine = sine_cosine(seen.joints[0, k])
+        session.block.observation[0, start + 2 * k] = sine
+        session.block.observation[0, start + 2 * k + 1] = cosine
+
+
+@inlined
+def _write_velocities(session: Session, seen: Seen, start: int, count: int) -> None:
+    """Moves in the last step, by the largest ones."""
+    for k in range(count):
+        moved = (seen.joints[0, k] - seen.before[0, k]) / session.rules.step_limit[k]
+        session.block.observation[0, start + k] = moved
+
+
+@inlined
+def _write_action(session: Session, seen: Seen, start: int, count: int) -> None:
+    """The last action, clipped."""
+    for k in range(count):
+        session.block.observation[0, start + k] = session.block.action[0, k]
+
+
+@inlined
+def _write_commanded(session: Session, seen: Seen, start: int, count: int) -> None:
+    """Joint positions that were commanded: without a plant, those that are."""
+    drive = session.block.drive
+    for k in range(count):
+        commanded = seen.joints[0, k]
+        if session.block.plant.shape[0] > 0 and k < drive.shape[1]:
+            commanded = drive[COMMAND, k]
+        session.block.observation[0, start + k] = commanded
+
+
+@inlined
+def _write_time(session: Session, seen: Seen, start: int, count: int) -> None:
+    """Share of the horizon that is left."""
+    horizon = session.rules.horizon
+    session.block.observation[0, start] = (horizon - session.block.steps[0]) / horizon
+
+
+def _slides(arm: "Arm", _: Scene) -> str:
+    sliding = [arm.joint_names[k] for k in np.flatnonzero(arm.chain.prismatic)]
+    return f"joint {sliding[0]} slides; joint_positions takes it" if sliding else ""
+
+
+def _is_bare(_: "Arm", scene: Scene) -> str:
+    return "" if scene.bodies else "the scene has neither bodies nor ground"
+
+
+def _has_no_obstacles(_: "Arm", scene: Scene) -> str:
+    boxed = any(body.shape != "halfspace" for body in scene.bodies)
+    return "" if boxed else "the scene has no bodies but half-spaces"
 
 
 POLAR = (1, -1, 1)
 """Signs of a vector in the reflection y -> -y."""
+
+UNIT = 1 + 1e-6
+"""Largest entry of a unit vector, to within rounding."""
 
 OBSERVATION = (
     Part(
@@ -141,9 +206,9 @@ OBSERVATION = (
         meaning="orientation of each joint frame, quaternion w, x, y, z",
         unit="1",
         signs=(1, -1, 1, -1),
-        bounds=lambda _: (-1 - 1e-6, 1 + 1e-6),  # to within rounding
-        write=_write_orientation,
-        per_joint=True,
+        bounds=lambda _: (-UNIT, UNIT),
+        write=_write_orientations,
+        of=JOINTS,
     ),
     Part(
         name="position",
@@ -151,79 +216,123 @@ OBSERVATION = (
         unit="m",
         signs=POLAR,
         bounds=lambda ranges: (-ranges.reach, ranges.reach),
-        write=_write_position,
-        per_joint=True,
+        write=_write_positions,
+        of=JOINTS,
+    ),
+    Part(
+        name="joint_positions",
+        meaning="position of each joint",
+        unit="rad or m",
+        signs=(0,),
+        bounds=lambda ranges: (ranges.lower, ranges.upper),
+        write=_write_joints,
+        of=JOINTS,
+    ),
+    Part(
+        name="joint_angles",
+        meaning="sine and cosine of each joint's angle",
+        unit="1",
+        signs=(0, 1),
+        bounds=lambda _: (-UNIT, UNIT),
+        write=_write_angles,
+        of=JOINTS,
+        lacks=_slides,
+    ),
+    Part(
+        name="joint_velocities",
+        meaning="velocity of each actuated joint in the last step, as a fraction of its limit",
+        unit="1",
+        signs=(0,),
+        bounds=lambda _: (-UNIT, UNIT),
+        write=_write_velocities,
+        of=ACTUATED,
+    ),
+    Part(
+        name="last_action",
+        meaning="last action, clipped; zeros at the start",
+        unit="1",
+        signs=(0,),
+        bounds=lambda _: (-1.0, 1.0),
+        write=_write_action,
+        of=ACTUATED,
+    ),
+    Part(
+        name="commanded",
+        meaning="commanded position of each joint",
+        unit="rad or m",
+        signs=(0,),
+        bounds=lambda ranges: (ranges.lower, ranges.upper),
+        write=_write_commanded,
+        of=JOINTS,
+    ),
+    Part(
+        name="time_left",
+        meaning="share of the horizon that is left",
+        unit="1",
+        signs=(1,),
+        bounds=lambda _: (0.0, 1.0),
+        write=_write_time,
+    ),
+    Part(
+        name="proximity",
+        meaning=(
+            "for each joint's link, a lower bound of the distance to the nearest body, at most "
+            f"{NEAR:g} m, and the direction away from it x, y, z, zeros at {NEAR:g} m"
+        ),
+        unit="m, 1",
+        signs=(1, *POLAR),
+        bounds=lambda _: (np.array([0.0, *[-UNIT] * 3]), np.array([NEAR, *[UNIT] * 3])),
+        write=write_proximity,
+        of=JOINTS,
+        lacks=_is_bare,
+    ),
+    Part(
+        name="obstacles",
+        meaning=(
+            "for each of the bodies nearest to the tool point, a box: middle minus tool point "
+            "x, y, z, half-size x, y, z, and the first two columns of its rotation; zeros for none"
+        ),
+        unit="m, m, 1",
+        signs=(*POLAR, 1, 1, 1, *POLAR, -1, 1, -1),
+        bounds=lambda _: (
+            np.array([*[-LARGEST] * 3, *[0.0] * 3, *[-UNIT] * 6]),
+            np.array([*[LARGEST] * 6, *[UNIT] * 6]),
+        ),
+        write=write_obstacles,
+        of=SLOTS,
+        lacks=_has_no_obstacles,
     ),
 )
 """The parts in order; those per joint go through all joints in turn."""
 
 
-GOAL_SIDE = 1
-"""Entry of the goal's y, which is positive on the left [m]."""
-
-
-def observation_size(n_joints: int) -> int:
-    """Length of an arm's observation."""
-    return sum(part.length(n_joints) for part in OBSERVATION)
-
-
-def observation_layout() -> str:
-    """Names and lengths of the parts, to compare."""
-    parts = (f"{part.name} {len(part.signs)}{'n' * part.per_joint}" for part in OBSERVATION)
-    return f"{VERSION}: {', '.join(parts)}"
-
-
-def observation_signs(n_joints: int) -> Array:
-    """Signs of entries in the reflection y -> -y, shape (n_observations,)."""
-    return np.concatenate([part.repeated(part.signs, n_joints) for part in OBSERVATION])
-
-
-def observation_bounds(ranges: Ranges, n_joints: int) -> tuple[Array, Array]:
-    """Lowest and highest values of the entries, shape (n_observations,) each."""
-    bounds = [(part, part.bounds(ranges)) for part in OBSERVATION]
-    lower, upper = (
-        np.concatenate([part.repeated(each[end], n_joints) for part, each in bounds])
-        for end in (0, 1)
-    )
-    return lower, upper
-
-
-def part_slices(n_joints: int) -> dict[str, slice]:
-    """Place of each part in an arm's observation, by name."""
-    ends = np.cumsum([part.length(n_joints) for part in OBSERVATION]).tolist()
-    return {
-        part.name: slice(end - part.length(n_joints), end)
-        for part, end in zip(OBSERVATION, ends, strict=True)
-    }
-
-
 def _compose(parts: Sequence[Part]) -> Any:
     """Join the formulas of parts into one kernel, inlined by Numba."""
-    write, length, per_joint = parts[0].write, len(parts[0].signs), parts[0].per_joint
+    write, index = parts[0].write, len(OBSERVATION) - len(parts)
     write_others = _compose(parts[1:]) if len(parts) > 1 else _write_nothing
 
     @inlined
-    def write_parts(
-        poses: Array, tool: Vector, goals: Array, e: int, observations: Array, start: int
-    ) -> None:
-        if per_joint:
-            for k in range(1, poses.shape[0]):
-                write(poses, tool, goals, e, k, observations, start)
-                start += length
-        else:
-            write(poses, tool, goals, e, 0, observations, start)
-            start += length
-        write_others(poses, tool, goals, e, observations, start)
+    def write_parts(session: Session, seen: Seen) -> None:
+        shown = session.rules.shown
+        if shown[index, 1] > 0:
+            write(session, seen, shown[index, 0], shown[index, 1])
+        write_others(session, seen)
 
     return write_parts
 
 
 @inlined
-def _write_nothing(
-    poses: Array, tool: Vector, goals: Array, e: int, observations: Array, start: int
-) -> None:
+def _write_nothing(session: Session, seen: Seen) -> None:
     """End of the observation."""
 
 
-write_observation = _compose(OBSERVATION)
-"""Kernel that writes a row of observations, from its first entry."""
+_write_step = _compose(OBSERVATION)
+
+
+@inlined
+def write_observation(session: Session, seen: Seen) -> None:
+    """Write what is seen after a step; what was seen before moves on."""
+    observation, width = session.block.observation, session.rules.width
+    for i in range(observation.shape[1] - 1, width - 1, -1):
+        observation[0, i] = observation[0, i - width]
+    _write_step(session, seen)

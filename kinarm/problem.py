@@ -25,6 +25,7 @@ from kinarm._fields import (
 from kinarm._files import absolute, named_file, write_text
 from kinarm.arm_specification import ArmSpecification
 from kinarm.errors import ProblemError, UnknownNameError
+from kinarm.observation_choice import PAPER_PARTS, Observation
 from kinarm.plant import Plant
 from kinarm.problem_files import PAPER_TASKS, find_scene, find_task, problem_names, read_problem
 from kinarm.scene import Scene
@@ -52,6 +53,8 @@ class ReachProblem(Checked):
         How time passes.
     plant : Plant
         What lies between a command and the joints.
+    observation : Observation
+        What a policy sees.
     """
 
     name: str
@@ -60,9 +63,12 @@ class ReachProblem(Checked):
     task: ReachTask
     stepping: Stepping = field(default_factory=Stepping)
     plant: Plant = field(default_factory=Plant, metadata=OPTIONAL)
+    observation: Observation = field(default_factory=Observation, metadata=OPTIONAL)
 
     def __post_init__(self) -> None:
         super().__post_init__()
+        if self.observation.parts == PAPER_PARTS:  # which is the default
+            object.__setattr__(self, "observation", replace(self.observation, parts=None))
         available = [region.name for region in self.scene.goal_regions]
         if not available:
             raise ProblemError("a scene needs at least one goal region")
@@ -108,11 +114,12 @@ class ReachProblem(Checked):
         **overrides
             ``name``; ``arm`` (a name, a path or a specification), ``scene`` and
             ``task`` (by name, of a file, of another problem, or themselves),
-            ``stepping``; ``plant`` (by name, of a file, or itself); ``reward``
-            (weights, or a mapping of those that change); or any field of task,
-            stepping or plant, such as ``tolerance``. None changes nothing. With
-            another scene, by name or file, that lacks a goal region of the task,
-            all its regions are to be reached.
+            ``stepping``; ``plant`` (by name, of a file, or itself);
+            ``observation`` (itself, a list of parts, or a mapping of what
+            changes); ``reward`` (weights, or a mapping of those that change);
+            or any field of task, stepping or plant, such as ``tolerance``. None
+            changes nothing. With another scene, by name or file, that lacks a
+            goal region of the task, all its regions are to be reached.
         """
         given = {name: value for name, value in overrides.items() if value is not None}
         if not given:
@@ -123,6 +130,8 @@ class ReachProblem(Checked):
         for name, find in (("scene", find_scene), ("task", find_task), ("plant", Plant.load)):
             if isinstance(changes.get(name), str | Path):
                 changes[name] = find(changes[name])
+        if "observation" in changes:
+            changes["observation"] = self.observation.changed(changes["observation"])
         task = changes.get("task", self.task)
         if isinstance(overrides.get("scene"), str | Path) and "task" not in changes:
             regions = {region.name for region in changes["scene"].goal_regions}

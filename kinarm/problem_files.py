@@ -18,7 +18,7 @@ Part = TypeVar("Part", Scene, ReachTask)
 PAPER_TASKS = {"left": ("left",), "right": ("right",), "both": ("left", "right")}
 """Goal regions of the paper's tasks 1, 2 and 3 by problem."""
 
-KEYS = {"base", "name", "arm", "scene", "task", "stepping", "plant"}
+KEYS = {"base", "name", "arm", "scene", "task", "stepping", "plant", "observation"}
 """Keys of a problem file."""
 
 
@@ -48,6 +48,8 @@ def read_problem(path: Path) -> dict[str, Any]:
     else:
         read_meshes(scene, path)
     read_meshes(entries.get("arm"), path)
+    if isinstance(entries.get("observation"), list):
+        entries["observation"] = {"parts": entries["observation"]}
     if isinstance(entries.get("plant"), str):
         entries["plant"] = to_plain(Plant.load(_beside(path, entries["plant"])))
     if isinstance(task, str):

@@ -5,18 +5,21 @@ and ``kinarm-bench`` compare with it.
 """
 
 from collections.abc import Callable
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
+import coal
 import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike
 
 from kinarm.arm import Arm
-from kinarm.collision import ContactModel
 from kinarm.contact_pairs import make_verdicts_reliable, start_anew
+from kinarm.errors import LARGEST
 from kinarm.kernels.compiling import Array
+from kinarm.observation import SLOTS
 from kinarm.reference_plant import ReferencePlant
 from kinarm.simulator import Simulator
+from kinarm.world import World
 
 
 class ReferenceEpisode(NamedTuple):
@@ -44,6 +47,27 @@ class ReferenceEpisode(NamedTuple):
     contact: tuple[str, str] | None
 
 
+class Moment(NamedTuple):
+    """What is seen of an episode after a step, beside joints and goal.
+
+    Attributes
+    ----------
+    joints, commanded, before : ndarray, shape (n_joints,)
+        Joint positions as they are, as commanded, and as seen before the step
+        [rad or m].
+    action, step, earlier
+        The step's action and number, and the observation before; None at the
+        start.
+    """
+
+    joints: Array
+    commanded: Array
+    before: Array
+    action: Array | None = None
+    step: int = 0
+    earlier: Array | None = None
+
+
 SAMPLES = 2000
 """Configurations of a step that is tested throughout."""
 
@@ -57,7 +81,7 @@ class ReferenceSimulator:
         self.tested = simulator.world.rules.tested or SAMPLES
         self._data = self.arm.model.createData()
         self._world, self._problem = simulator.world, simulator.problem
-        self._begin(simulator.world.contact_model)
+        self._begin(simulator.world)
 
     def rollout(
         self, policy: Callable[[Array], ArrayLike], start: Array, goal: Array
@@ -72,13 +96,14 @@ class ReferenceSimulator:
         start, goal : ndarray, shape (n_joints,) and (3,)
             Start configuration [rad or m] and goal position [m].
         """
-        self._begin(self._world.in_scene(start, goal).contact_model)
+        self._begin(self._world.in_scene(start, goal))
         begun = self.contact_model.shapes.placed[list(self._problem.scene.moving), 13:]
         positions = begun + self._problem.body_offsets(np.arange(self.task.horizon + 1))
         q, reward = np.array(start), self.task.reward
         joints = ReferencePlant(self._world, q, goal)
-        distance = self.observe(q, goal)[1]
-        observation = self.observe(*joints.seen(q, 0))[0]
+        distance, seen = self.observe(q, goal)[1], joints.seen(q, 0)
+        moment = Moment(q, joints.commanded(q), seen[0])
+        observation = self.observe(*seen, moment)[0]
         path, observations = [q], [observation]
         rewards: list[float] = []
         success, contact = False, None
@@ -90,7 +115,10 @@ class ReferenceSimulator:
             if contact is None:
                 q = target
                 distance = self.observe(q, goal)[1]
-                observation = self.observe(*joints.seen(q, len(rewards) + 1))[0]
+                before_it, now = seen[0], len(rewards) + 1
+                seen, commanded = joints.seen(q, now), joints.commanded(q)
+                moment = Moment(q, commanded, before_it, action, now, observation)
+                observation = self.observe(*seen, moment)[0]
                 success = distance <= self.task.tolerance
             rewards.append(
                 reward.progress * (before - distance)
@@ -111,20 +139,67 @@ class ReferenceSimulator:
             contact=contact,
         )
 
-    def _begin(self, contact_model: ContactModel) -> None:
+    def _begin(self, there: World) -> None:
         """Take the bodies of an episode."""
-        self.contact_model, self._geometry = contact_model, contact_model.geometry.clone()
+        self._there, self.contact_model = there, there.contact_model
+        self._geometry = self.contact_model.geometry.clone()
         self._geometry_data = make_verdicts_reliable(self._geometry.createData())
 
-    def observe(self, q: Array, goal: Array) -> tuple[Array, float]:
-        """Observation of a configuration and the distance to the goal [m]."""
+    def observe(self, q: Array, goal: Array, moment: Moment | None = None) -> tuple[Array, float]:
+        """Observation of a configuration and the distance to the goal [m].
+
+        All parts but ``proximity``, whose planes only kernels find, are computed anew.
+
+        Parameters
+        ----------
+        q, goal : ndarray, shape (n_joints,) and (3,)
+            Configuration [rad or m] and goal [m] as they are seen.
+        moment : Moment, optional
+            What else is seen; by default at the start of an episode there.
+        """
+        now = moment or Moment(q, q, q)
         model, data = self.arm.model, self._data
         pin.framesForwardKinematics(model, data, q)
         tool = data.oMf[model.getFrameId(self.arm.tool_frame, pin.FrameType.BODY)].translation
         offset = goal - tool
         positions = [data.oMi[i].translation for i in range(1, model.njoints)]
-        parts = [goal, offset, *self._quaternions(q), *positions]
-        return np.concatenate(parts), float(np.linalg.norm(offset))
+        limit, layout = self._world.rules.step_limit, self._there.layout
+        formulas: dict[str, Callable[[], Any]] = {
+            "goal": lambda: goal,
+            "goal_minus_tool": lambda: offset,
+            "orientation": lambda: self._quaternions(q),
+            "position": lambda: positions,
+            "joint_positions": lambda: q,
+            "joint_angles": lambda: np.stack([np.sin(q), np.cos(q)], axis=1),
+            "joint_velocities": lambda: (q - now.before)[: len(limit)] / limit,
+            "last_action": lambda: 0 * limit if now.action is None else now.action,
+            "commanded": lambda: now.commanded,
+            "time_left": lambda: 1 - now.step / self.task.horizon,
+            "proximity": lambda: self._there.observe([now.joints], [goal], now.step)[0, near],
+            "obstacles": lambda: self._nearest(tool, layout.counts[SLOTS]),
+        }
+        near = layout.places.get("proximity")
+        seen = np.concatenate([np.ravel(formulas[part.name]()) for part in layout.parts])
+        earlier = np.tile(seen, layout.history) if now.earlier is None else now.earlier
+        observation = np.concatenate([seen, earlier[: layout.size - layout.width]])
+        return observation, float(np.linalg.norm(offset))
+
+    def _nearest(self, tool: Array, slots: int) -> Array:
+        """Boxes around the bodies that are nearest to the tool point, shape (slots, 12)."""
+        found: list[tuple[float, Array]] = []
+        for body in list(self._geometry.geometryObjects)[self.arm.geometry.ngeoms :]:
+            shape, pose = body.geometry, body.placement
+            if isinstance(shape, coal.Halfspace) or np.abs(pose.translation).max() > LARGEST / 2:
+                continue
+            shape.computeLocalAABB()
+            box = shape.aabb_local
+            half, middle = (box.max_ - box.min_) / 2, pose.act((box.max_ + box.min_) / 2)
+            away = np.abs(pose.rotation.T @ (tool - middle)) - half
+            distance = float(np.linalg.norm(np.maximum(away, 0.0)))
+            row = [middle - tool, half, pose.rotation[:, 0], pose.rotation[:, 1]]
+            found.append((distance, np.concatenate(row)))
+        rows = [row for _, row in sorted(found, key=lambda each: each[0])[:slots]]
+        return np.array([*rows, *[np.zeros(12)] * (slots - len(rows))])
 
     def _quaternions(self, q: Array) -> list[Array]:
         """World orientations of joint frames, composed along the chain."""

@@ -89,6 +89,10 @@ class ReferencePlant:
             seen[:n] = self._commands[-1]
         return seen, self._goal + self._numbers[OFFSETS + 2 * n :] + by_goal * noise[n:]
 
+    def commanded(self, q: Array) -> Array:
+        """Joint positions that were last commanded [rad or m]."""
+        return np.concatenate([self._commands[-1], q[len(self._limit) :]])
+
     def _normal(self, count: int) -> float:
         """Nearly normal number, by SplitMix64: the sum of four."""
         high, low = self._numbers[HIGH_BITS : HIGH_BITS + 2]

@@ -13,7 +13,7 @@ from kinarm.bodies import PARKED
 from kinarm.chain import Chain, within_limits
 from kinarm.clearance import Clearance, flattened, measure_clearance
 from kinarm.collision import ContactModel
-from kinarm.contact_shapes import PLANE, ContactShapes
+from kinarm.contact_shapes import PLANE, ContactShapes, unit_boxes
 from kinarm.episode_plants import EpisodePlants
 from kinarm.episode_scenes import drawn_rows
 from kinarm.episodes import Control, Episodes, Rules
@@ -32,7 +32,7 @@ from kinarm.kernels.records import recorded
 from kinarm.kernels.rollout import begin
 from kinarm.kernels.screening import screen
 from kinarm.kernels.session import Alone, Block, Session, furnish, work_space
-from kinarm.observation import observation_size
+from kinarm.observation_layout import ObservationLayout
 from kinarm.plant import PlantLike
 from kinarm.problem import ProblemLike, ReachProblem
 from kinarm.scene_draws import SceneDraws
@@ -89,6 +89,9 @@ class World(InverseKinematics, StepContact):
             moves=self.problem.body_offsets(np.arange(task.horizon + 1)),
             time_step=stepping.time_step,
             commanded=int(self.problem.plant.feedback == "commanded"),
+            shown=self.layout.shown,
+            width=self.layout.width,
+            boxes=unit_boxes(self.problem.scene.bodies),
         )
         self.plants = EpisodePlants(self.problem, self.rules.step_limit)
         self.has_random_bodies = bool(self.problem.scene.random_bodies)
@@ -127,7 +130,7 @@ class World(InverseKinematics, StepContact):
 
     def __getstate__(self) -> dict[str, Any]:
         # A copy may get other rules or bodies, and needs its own work space.
-        own = ("records", "_bodies")
+        own = ("records", "layout", "_bodies")
         kept = {name: value for name, value in self.__dict__.items() if name not in own}
         return kept | {"_idle": []}
 
@@ -135,6 +138,11 @@ class World(InverseKinematics, StepContact):
     def goals(self) -> Goals:
         """Where the task's goals lie."""
         return self.problem.task.goals_in(self.problem.scene)
+
+    @cached_property
+    def layout(self) -> ObservationLayout:
+        """Where the parts of an observation are."""
+        return ObservationLayout.of(self.problem, self.arm)
 
     @cached_property
     def records(self) -> tuple[Chain, ContactShapes, Rules]:
@@ -145,19 +153,20 @@ class World(InverseKinematics, StepContact):
     @property
     def n_observations(self) -> int:
         """Length of an observation."""
-        return observation_size(self.arm.n_joints)
+        return self.layout.size
 
     @property
     def n_actions(self) -> int:
         """Length of an action."""
         return self.arm.n_actuated
 
-    def observe(self, configurations: ArrayLike, goals: ArrayLike) -> Array:
+    def observe(self, configurations: ArrayLike, goals: ArrayLike, step: int = 0) -> Array:
         """Observations of configurations, shape (n, n_observations), also of those in contact.
 
-        Takes joint positions, shape (n, n_joints) [rad or m], and goals, shape (n, 3) [m].
+        They are those of episodes that begin there, after so many steps. Takes joint positions,
+        shape (n, n_joints) [rad or m], and goals, shape (n, 3) [m].
         """
-        return self._begun_at(configurations, goals).observation
+        return self._begun_at(configurations, goals, step).observation
 
     def distances(self, configurations: ArrayLike, goals: ArrayLike) -> Array:
         """Distances of the tool from goals, shape (n,) [m]; see `observe`."""
@@ -341,10 +350,13 @@ class World(InverseKinematics, StepContact):
     def _bodies(self) -> Bodies:
         return flattened(self.contact_model.geometry)
 
-    def _begun_at(self, configurations: ArrayLike, goals: ArrayLike) -> Episodes:
+    def _begun_at(self, configurations: ArrayLike, goals: ArrayLike, step: int = 0) -> Episodes:
         """Episodes that begin at configurations, in contact or not."""
         q = finite_array("configurations", configurations, (None, self.arm.n_joints))
         goal = finite_array("goals", goals, (len(q), 3))
         session = self.session(Control(), self.episodes(q, goal))
+        session.episodes.steps[:] = step
+        if self.has_random_bodies and self.layout.sees_bodies:
+            session.episodes.scenes[:] = self.scenes_of(q, goal)
         begin(np.zeros(1, dtype=np.int64), session, np.arange(len(q)))
         return session.episodes

@@ -19,7 +19,6 @@ from kinarm.contact_shapes import CUBE
 from kinarm.errors import InvalidInputError
 from kinarm.kernels.compiling import Array
 from kinarm.networks import Mirror
-from kinarm.observation import observation_signs
 from kinarm.problem import ReachProblem
 from kinarm.world import World
 
@@ -36,7 +35,10 @@ def find_mirror(world: World) -> Mirror:
     arm = world.arm
     along_y = np.abs(arm.chain.axis[:, 1]) > 0.5
     axes = np.where(along_y ^ arm.chain.prismatic, 1.0, -1.0)
-    mirror = Mirror(observation_signs(arm.n_joints), axes[: arm.n_actuated])
+    side = world.layout.side
+    if side is None:
+        raise InvalidInputError("the observation has no part 'goal', which tells the side")
+    mirror = Mirror(world.layout.signs(axes), axes[: arm.n_actuated], side)
     rng = np.random.default_rng(0)
     q = rng.uniform(arm.lower, arm.upper, (TESTED_CONFIGURATIONS, arm.n_joints))
     goals = rng.normal(size=(TESTED_CONFIGURATIONS, 3))

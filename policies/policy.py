@@ -1,7 +1,7 @@
 """The class of all trained policies, and its file."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import chain, count
 from pathlib import Path
@@ -15,12 +15,15 @@ from kinarm.arm import Arm
 from kinarm.errors import InvalidInputError, PolicyFileError, finite_array
 from kinarm.networks import ACTIVATIONS, Activation, Mirror, Networks, checked_activations
 from kinarm.networks import Layer as Layer
-from kinarm.observation import OBSERVATION, observation_layout, observation_size, part_slices
+from kinarm.observation_layout import ObservationLayout, observation_layout
 from kinarm.policies.normalizer import fold_normalizer, input_scale
 from kinarm.policies.provenance import Provenance
 from kinarm.problem import ProblemLike, ReachProblem
 
 FORMAT_VERSION = 3
+
+SIGNS = ("observations", "actions")
+"""Arrays of a mirror."""
 
 LARGEST = 1e30
 """Largest magnitude of statistics and weights: beyond it, actions overflow."""
@@ -75,8 +78,9 @@ class Policy:
             mirror = Mirror(
                 finite_array("mirror of observations", mirror.observations, mean.shape),
                 finite_array("mirror of actions", mirror.actions, (width,)),
+                mirror.side,
             )
-        for array in (mean, std, *chain(*layers), *(mirror or ())):
+        for array in (mean, std, *chain(*layers), *(mirror or ())[:2]):
             if np.abs(array).max(initial=0.0) > LARGEST:
                 raise InvalidInputError(f"statistics and weights must be at most {LARGEST:g}")
             array.flags.writeable = False
@@ -100,6 +104,12 @@ class Policy:
     def n_observations(self) -> int:
         """Length of an observation."""
         return len(self.mean)
+
+    @property
+    def layout(self) -> ObservationLayout:
+        """Where the parts of an observation are."""
+        sizes = (ObservationLayout.sized(self.problem, n, self.n_actions) for n in count(1))
+        return next(each for each in sizes if each.size >= self.n_observations)
 
     @property
     def n_actions(self) -> int:
@@ -143,7 +153,7 @@ class Policy:
             Of no effect; the state is returned as it is.
         """
         if isinstance(observation, Mapping):
-            observation = flat_observation(observation, self.n_observations)
+            observation = flat_observation(observation, self.layout)
         return self(observation), state
 
     def networks(self) -> Networks:
@@ -259,21 +269,21 @@ class Policy:
 def layer_widths(problem: ReachProblem, hidden: Sequence[int] = ()) -> tuple[int, ...]:
     """Widths of a policy's layers, from the observation to the action."""
     arm = problem.load_arm()
-    return (observation_size(arm.n_joints), *hidden, arm.n_actuated)
+    return (ObservationLayout.of(problem, arm).size, *hidden, arm.n_actuated)
 
 
 def policy_content(policy: Policy) -> Archive:
     """A policy as files hold it, for `policy_of_content`."""
     header = {
         "provenance": policy.provenance.to_json(),
-        "observation": observation_layout(),
+        "observation": observation_layout(policy.problem),
         "activations": list(policy.activations),
     }
     arrays = {"mean": policy.mean, "std": policy.std}
     for number, layer in enumerate(policy.layers):
         arrays |= {f"weights_{number}": layer.weights, f"bias_{number}": layer.bias}
     if policy.mirror is not None:
-        arrays |= {f"mirror_{name}": part for name, part in policy.mirror._asdict().items()}
+        arrays |= {f"mirror_{name}": getattr(policy.mirror, name) for name in SIGNS}
     return Archive(header, arrays)
 
 
@@ -283,50 +293,53 @@ def policy_of_content(content: Archive, where: str) -> Policy:
     Call it within `kinarm._files.reading`, which turns errors into messages.
     """
     header, arrays = content
-    if header["observation"] != observation_layout():
+    provenance = Provenance.from_json(header["provenance"])
+    layout = observation_layout(provenance.problem)
+    if header["observation"] != layout:
         raise PolicyFileError(
-            f"{where} understands observations of layout "
-            f"{header['observation']!r}, not {observation_layout()!r}"
+            f"{where} understands observations of layout {header['observation']!r}, not {layout!r}"
         )
     n_layers = sum(name.startswith("weights_") for name in arrays)
-    signs = [f"mirror_{name}" for name in Mirror._fields]
-    mirrored = any(name in arrays for name in signs)
-    return Policy(
+    policy = Policy(
         mean=arrays["mean"],
         std=arrays["std"],
         layers=tuple(Layer(arrays[f"weights_{k}"], arrays[f"bias_{k}"]) for k in range(n_layers)),
-        provenance=Provenance.from_json(header["provenance"]),
+        provenance=provenance,
         activations=tuple(header["activations"]),
-        mirror=Mirror(*(arrays[name] for name in signs)) if mirrored else None,
     )
+    signs = [f"mirror_{name}" for name in SIGNS]
+    if not any(name in arrays for name in signs):
+        return policy
+    observations, actions = (arrays[name] for name in signs)
+    return replace(policy, mirror=Mirror(observations, actions, policy.layout.side or 0))
 
 
 GOAL_KEYS = ("observation", "achieved_goal", "desired_goal")
 """Entries of a dictionary observation; the achieved goal is the tool point."""
 
 
-def flat_observation(given: Mapping[str, ArrayLike], n_observations: int) -> NDArray[np.float64]:
+def flat_observation(
+    given: Mapping[str, ArrayLike], layout: ObservationLayout
+) -> NDArray[np.float64]:
     """Make a flat observation of a dictionary observation.
 
     It holds just ``observation``, shape (..., n_own), ``achieved_goal`` and ``desired_goal``, shape
-    (..., 3) [m]. The flat one has the shape (..., n_observations).
+    (..., 3) [m]. The flat one has the shape (..., n_observations), of the layout.
     """
     if set(given) != set(GOAL_KEYS):
         raise InvalidInputError(
             f"a dictionary observation has the keys {', '.join(GOAL_KEYS)}, got "
             f"{', '.join(map(str, given))}"
         )
-    places = part_slices(next(n for n in count(1) if observation_size(n) >= n_observations))
-    own = [places[part.name] for part in OBSERVATION if not part.of_goal]
-    entries = np.concatenate([np.arange(place.start, place.stop) for place in own])
+    if layout.history > 1:
+        raise InvalidInputError("a policy with a history needs a flat observation")
+    (goals, offsets), entries = layout.goal_places, layout.entries(of_goal=False)
     batch = np.shape(given["desired_goal"])[:-1]
     rows = (None,) * len(batch)
     goal, tool = (
         finite_array(name, given[name], (*rows, 3)) for name in ("desired_goal", "achieved_goal")
     )
     rest = finite_array("observation", given["observation"], (*rows, len(entries)))
-    flat = np.empty((*batch, n_observations))
-    flat[..., places["goal"]] = goal
-    flat[..., places["goal_minus_tool"]] = goal - tool
-    flat[..., entries] = rest
+    flat = np.empty((*batch, layout.size))
+    flat[..., goals], flat[..., offsets], flat[..., entries] = goal, goal - tool, rest
     return flat

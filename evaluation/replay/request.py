@@ -237,7 +237,7 @@ class ReplayRequest(ProblemOptions):
         (contestant,), problem = named_contestants(self, [self.policy])
         simulator = Simulator(problem)
         say_choices([simulator.problem])
-        contestant.check(simulator.arm, allow_other_arm=self.allow_other_arm)
+        contestant.check(problem, simulator.arm, allow_other_arm=self.allow_other_arm)
         fresh = fresh_recordings(contestant, simulator, self.seed or 0)
         # The first one loads and compiles what is needed before the page is announced.
         recordings = chain([next(fresh)], fresh)

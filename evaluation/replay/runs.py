@@ -50,7 +50,8 @@ def record(
     PolicyFileError
         If the policy was trained for another arm, which is not allowed.
     """
-    contestant.check(trials.simulator.arm, allow_other_arm=allow_other_arm)
+    simulator = trials.simulator
+    contestant.check(simulator.problem, simulator.arm, allow_other_arm=allow_other_arm)
     rollouts = contestant.run(trials, record=True)
     made = contestant.policy.provenance.to_json() if contestant.policy else None
     known = [] if bounds is None else bounds.steps_lower_bound.tolist()

@@ -14,10 +14,11 @@ from gymnasium.spaces import Box, Space
 from numpy.typing import DTypeLike, NDArray
 
 from kinarm.chain import within_limits
+from kinarm.envs.extra import ExtraObservation
 from kinarm.envs.rendering import RENDER_MODES, EnvPictures
 from kinarm.episodes import Episodes, StepResult
 from kinarm.errors import InvalidInputError, UnknownNameError, one_or_many
-from kinarm.observation import Ranges, observation_bounds
+from kinarm.observation import Ranges
 from kinarm.problem import ProblemLike, ReachProblem
 from kinarm.scenarios import ScenarioQueues
 from kinarm.simulator import Simulator
@@ -35,7 +36,15 @@ DTYPES = ("float64", "float32")
 TERM_KEYS = tuple(f"reward_{name}" for name in REWARD_TERMS)
 
 SETTINGS = (
-    *("render_mode", "width", "height", "camera", "observation_dtype", "reward_type"),
+    *(
+        "render_mode",
+        "width",
+        "height",
+        "camera",
+        "observation_dtype",
+        "reward_type",
+        "extra_observation",
+    ),
     *("num_envs", "autoreset_mode", "threads", "vectorization_mode"),
 )
 """Arguments of environments beside their problem's."""
@@ -67,6 +76,7 @@ class Interface:
     observation_space: Space[Any]
     action_space: Space[Any]
     tells_terms = True
+    extra: ExtraObservation | None = None
 
     def __init__(self, simulator: Simulator, dtype: DTypeLike = np.float64) -> None:
         try:
@@ -91,6 +101,15 @@ class Interface:
         """Show copies of the simulator's observations, shape (n, n_observations)."""
         return observations.astype(self._dtype)
 
+    def show(
+        self, episodes: Episodes, rows: NDArray[np.int64] | slice = slice(None)
+    ) -> Observations:
+        """Observations of some episodes, with further entries if there are any."""
+        shown = self.observe(episodes.observation[rows])
+        if self.extra is None:
+            return shown
+        return self.extra.appended(shown, self.simulator, episodes, rows)
+
     def step_outcome(self, episodes: Episodes, result: StepResult) -> Outcome:  # noqa: ARG002
         """Reward a step, and tell or change which episodes are over."""
         return result.reward, result.terminated, result.truncated
@@ -111,8 +130,10 @@ def state_bounds(simulator: Simulator) -> tuple[Array, Array]:
         goal_lower=np.min([region.lower for region in regions], axis=0) - task.tolerance,
         goal_upper=np.max([region.upper for region in regions], axis=0) + task.tolerance,
         reach=simulator.arm.reach,
+        lower=simulator.arm.lower,
+        upper=simulator.arm.upper,
     )
-    return observation_bounds(ranges, simulator.arm.n_joints)
+    return simulator.world.layout.bounds(ranges)
 
 
 def bounded_space(bounds: tuple[Array, Array], dtype: np.dtype[Any]) -> Space[Any]:
@@ -168,6 +189,7 @@ class ArmEnvironment(Lifecycle):
         threads: int | None,
         overrides: Mapping[str, Any],
         dtype: DTypeLike,
+        extra: ExtraObservation | None,
         render_mode: str | None,
         **picture: Any,
     ) -> None:
@@ -184,6 +206,9 @@ class ArmEnvironment(Lifecycle):
             ) from error
         self.render_mode = render_mode
         self.interface = self._make_interface(simulator, dtype)
+        if extra is not None:
+            self.interface.extra = extra
+            self.interface.observation_space = extra.space(self.interface.observation_space)
         self.metadata = self.interface.metadata
         self._told = ("distance", *(TERM_KEYS if self.interface.tells_terms else ()))
         self._queues, self._n_arms = ScenarioQueues(simulator.world, num_envs), num_envs

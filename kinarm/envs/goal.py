@@ -20,7 +20,6 @@ from kinarm.envs.reach import ReachEnv
 from kinarm.envs.vector import ReachVectorEnv
 from kinarm.episodes import TRUNCATED, Episodes, StepResult
 from kinarm.errors import InvalidInputError
-from kinarm.observation import OBSERVATION, part_slices
 from kinarm.simulator import Simulator
 
 RewardType = Literal["sparse", "dense"]
@@ -101,34 +100,30 @@ class GoalInterface(GoalRewards, Interface):
                 f"reward_type must be one of {list(get_args(RewardType))}, got {reward_type!r}"
             )
         self.reward_type = reward_type
-        self._places = part_slices(simulator.arm.n_joints)
-        self._own = [self._places[part.name] for part in OBSERVATION if not part.of_goal]
+        layout = simulator.world.layout
+        (self._goal, self._offset), self._own = layout.goal_places, layout.entries(of_goal=False)
         super().__init__(simulator, dtype)
 
     def _space(self) -> Space[Any]:
         lower, upper = state_bounds(self.simulator)
-        goals, reach = self._places["goal"], np.full(3, self.simulator.arm.reach)
+        reach = np.full(3, self.simulator.arm.reach)
         bounds = {
-            "observation": (self._own_parts(lower), self._own_parts(upper)),
+            "observation": (lower[self._own], upper[self._own]),
             "achieved_goal": (-reach, reach),
-            "desired_goal": (lower[goals], upper[goals]),
+            "desired_goal": (lower[self._goal], upper[self._goal]),
         }
         return Dict({name: bounded_space(pair, self._dtype) for name, pair in bounds.items()})
 
     def observe(self, observations: Array) -> Observations:
         """Split observations into ``observation``, ``achieved_goal`` and ``desired_goal``."""
         achieved, desired = self._goals(observations)
-        own = self._own_parts(observations).astype(self._dtype, copy=False)
+        own = observations[:, self._own].astype(self._dtype, copy=False)
         return {"observation": own, "achieved_goal": achieved, "desired_goal": desired}
-
-    def _own_parts(self, observations: Array) -> Array:
-        """Parts of observations that do not depend on the goal, shape (..., n)."""
-        return np.concatenate([observations[..., place] for place in self._own], axis=-1)
 
     def _goals(self, observations: Array) -> tuple[NDArray[Any], NDArray[Any]]:
         """Tool points and goals, shape (n, 3) each [m]."""
-        goals = observations[:, self._places["goal"]]
-        tools = goals - observations[:, self._places["goal_minus_tool"]]
+        goals = observations[:, self._goal]
+        tools = goals - observations[:, self._offset]
         return tools.astype(self._dtype, copy=False), goals.astype(self._dtype)
 
     def step_outcome(self, episodes: Episodes, result: StepResult) -> Outcome:

@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 from kinarm.episode_scenes import scene_of_episode
 from kinarm.episodes import COLLISION, SUCCESS, TRUNCATED, Episodes
 from kinarm.errors import InvalidInputError, whole_number
-from kinarm.observation import part_slices
 from kinarm.simulator import Simulator
 from kinarm.viewer.camera import Camera, CameraLike
 
@@ -177,5 +176,5 @@ class EnvPictures:
 
     def _tools(self, episodes: Episodes) -> NDArray[np.float64]:
         """Tool points, shape (num_envs, 3) [m]."""
-        offset = part_slices(self._simulator.arm.n_joints)["goal_minus_tool"]
-        return episodes.goal - episodes.observation[:, offset]
+        tools: NDArray[np.float64] = self._simulator.world.poses(episodes.q)[:, :3, 3]
+        return tools

@@ -6,9 +6,11 @@ term is a field of `kinarm.task.RewardWeights` and a formula here, in the same o
 
 import math
 
-from kinarm.kernels.compiling import Array, Vector, inlined
+from kinarm.kernels.compiling import Array, inlined
 from kinarm.kernels.kinematics import to_world
 from kinarm.kernels.lanes import select
+from kinarm.kernels.session import Block, Session
+from kinarm.kernels.surroundings import Seen
 from kinarm.observation import write_observation
 
 PROGRESS, CLOSER, STEP, COLLISION, SUCCESS = range(5)
@@ -45,25 +47,28 @@ def add_reward(
 
 
 @inlined
-def observe(tool: Array, poses: Array, goals: Array, row: int, observations: Array) -> float:
-    """Write a row of observations; return the distance to the goal [m].
+def remember(block: Block) -> None:
+    """Keep which joint positions are seen, until after the next step."""
+    for joint in range(block.q.shape[1]):
+        block.former[0, joint] = block.q[0, joint]
+        if block.plant.shape[0] > 0:
+            block.former[0, joint] = block.sensed[0, joint]
 
-    Takes the poses of the joint frames alone.
+
+@inlined
+def observe(session: Session, poses: Array) -> float:
+    """Write the observation of a block; return the distance to the goal [m].
+
+    Takes the poses of joint frames and bodies.
     """
-    point = to_world(poses, poses.shape[0] - 1, tool[0], tool[1], tool[2])
-    write_observation(poses, point, goals, row, observations, 0)
-    return distance_between(point, goals, row)
-
-
-@inlined
-def distance_to(tool: Array, poses: Array, goals: Array, row: int) -> float:
-    """Distance of the tool from a goal [m]."""
-    point = to_world(poses, poses.shape[0] - 1, tool[0], tool[1], tool[2])
-    return distance_between(point, goals, row)
-
-
-@inlined
-def distance_between(point: Vector, goals: Array, row: int) -> float:
-    """Distance of a point from a goal [m]."""
-    dx, dy, dz = goals[row, 0] - point[0], goals[row, 1] - point[1], goals[row, 2] - point[2]
+    chain, block = session.chain, session.block
+    n_joints, tool = block.q.shape[1], chain.tool
+    point = to_world(poses, n_joints, tool[0], tool[1], tool[2])
+    frames, goal, joints, seen = poses, block.goal, block.q, point
+    if block.plant.shape[0] > 0:
+        frames, goal, joints = block.seen_poses, block.seen_goal, block.sensed
+        seen = to_world(frames, n_joints, tool[0], tool[1], tool[2])
+    write_observation(session, Seen(poses, frames, seen, goal, joints, block.former))
+    goal = block.goal
+    dx, dy, dz = goal[0, 0] - point[0], goal[0, 1] - point[1], goal[0, 2] - point[2]
     return math.sqrt(dx * dx + dy * dy + dz * dz)

@@ -22,7 +22,7 @@ from kinarm.kernels.proof import (
     prove_step,
     renew_planes,
 )
-from kinarm.kernels.reward import add_reward, distance_to, observe
+from kinarm.kernels.reward import add_reward, observe, remember
 from kinarm.kernels.session import (
     Session,
     load_episode,
@@ -56,23 +56,24 @@ def begin(counters: NDArray[np.int64], session: Session, rows: NDArray[np.int64]
             e = rows[start + min(lane, filled - 1)]
             put(q, e, block.q, 0, lane)
             put(episodes.goal, e, block.goal, 0, lane)
+            as_numbers(block.steps)[0, lane] = episodes.steps[e]
             if block.plant.shape[0] > 0:
                 put(episodes.plant, e, block.plant, 0, lane)
                 put(episodes.drive[e], COMMAND, block.drive, COMMAND, lane)
-                as_numbers(block.steps)[0, lane] = episodes.steps[e]
             put_scene(episodes.scenes, e, lane, block.after)
             if episodes.scenes.shape[0] > 0:
                 step = episodes.steps[e]
                 move_bodies(e, step, lane, shapes, rules, episodes.scenes, block.after)
         forward_kinematics(chain, block.q, 0, block.after)
         free, _ = prove_configurations(shapes, 0, filled, block, alone)
-        arm = block.after[: q.shape[1] + 1]
         if block.plant.shape[0] > 0:
             sense(chain, rules, block)
-            observe(chain.tool, block.seen_poses, block.seen_goal, 0, block.observation)
-            block.distance[0] = distance_to(chain.tool, arm, block.goal, 0)
-        else:
-            block.distance[0] = observe(chain.tool, arm, block.goal, 0, block.observation)
+        remember(block)
+        for axis in range(block.action.shape[1]):
+            block.action[0, axis] = 0.0
+        block.distance[0] = observe(session, block.after)
+        for i in range(rules.width, block.observation.shape[1]):
+            block.observation[0, i] = block.observation[0, i - rules.width]
         # Store all that an episode begins with.
         for lane in range(filled):
             e = rows[start + lane]
@@ -102,7 +103,7 @@ def advance(counters: NDArray[np.int64], session: Session) -> int:
     chain, shapes, rules = session.chain, session.shapes, session.rules
     control, episodes = session.control, session.episodes
     block, alone = session.block, session.alone
-    tool, lower, upper, row = chain.tool, chain.lower, chain.upper, block.row
+    lower, upper, row = chain.lower, chain.upper, block.row
     n_joints, n_actuated = episodes.q.shape[1], rules.step_limit.shape[0]
     n_episodes, n_pairs = episodes.status.shape[0], shapes.planes.shape[0]
     shared, summed = shared_policy(n_episodes, control), block.moments.shape[1]
@@ -181,18 +182,15 @@ def advance(counters: NDArray[np.int64], session: Session) -> int:
         block.cleared[0] = 0.0
         nearer = block.distance[0]
         block.steps[0] += 1.0
-        if block.plant.shape[0] == 0:
-            after = observe(tool, poses[: n_joints + 1], block.goal, 0, block.observation)
-        else:
-            after = distance_to(tool, poses[: n_joints + 1], block.goal, 0)
-        block.distance[0] = after
-        reached, never = after <= rules.tolerance, after < 0.0
-        add_reward(rules.reward, nearer, after, never, reached, block.terms, block.total, 0)
+        remember(block)
         for joint in range(n_joints):
             block.q[0, joint] = block.target[0, joint]
         if block.plant.shape[0] > 0:
             sense(chain, rules, block)
-            observe(tool, block.seen_poses, block.seen_goal, 0, block.observation)
+        after = observe(session, poses)
+        block.distance[0] = after
+        reached, never = after <= rules.tolerance, after < 0.0
+        add_reward(rules.reward, nearer, after, never, reached, block.terms, block.total, 0)
         if episodes.path.shape[0] > 0:
             for lane in range(row.shape[0]):
                 if row[lane] >= 0:

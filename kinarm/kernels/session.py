@@ -73,6 +73,8 @@ def layouts(
         "plant": (has_plant, plant),
         "drive": (drive, n_actuated),
         "sensed": (has_plant, n_joints),
+        # Joint positions as seen before the step.
+        "former": (ONE, n_joints),
         "seen_goal": (has_plant, THREE),
         "seen_poses": (has_plant * (n_joints + 1), Fixed(POSE)),
         # Poses before and after the step, which swap from step to step.
@@ -213,7 +215,8 @@ def load_episode(
     put(episodes.q, e, block.q, 0, lane)
     put(episodes.target, e, block.target, 0, lane)
     put(episodes.goal, e, block.goal, 0, lane)
-    if control.layers.shape[0] > 0 or block.moments.shape[1] > 0:
+    remembers = rules.width < block.observation.shape[1]
+    if control.layers.shape[0] > 0 or block.moments.shape[1] > 0 or remembers:
         put(episodes.observation, e, block.observation, 0, lane)
     if block.plant.shape[0] > 0:
         put(episodes.plant, e, block.plant, 0, lane)
@@ -324,6 +327,7 @@ class Session(Record):
         collected = 0 if shift is None else len(starts)
         if (
             episodes.q.shape != starts.shape
+            or self.control.side != control.side
             or len(episodes.moments) != collected
             or any(own.shape != other.shape for own, other in parts)
         ):

@@ -53,7 +53,7 @@ class ARSTraining:
             if self.config.normalize:
                 normalizer = statistics(policy)
         elif self.config.net_arch:
-            deviations = first_deviations(self.simulator.arm.n_joints)
+            deviations = first_deviations(self.simulator.world.layout)
             theta = initial_network(rng, deviations, self._widths[1:])
         else:
             theta = np.zeros((n_actions, n_observations))

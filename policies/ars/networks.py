@@ -13,7 +13,7 @@ from kinarm.kernels.compiling import Array, inlined, kernel
 from kinarm.kernels.elementary import LOG_2, LOG_2_REST, sine_cosine
 from kinarm.kernels.lanes import LANES, as_lanes, power_of_two, select
 from kinarm.networks import Layer, Networks, split_parameters
-from kinarm.observation import part_slices
+from kinarm.observation_layout import ObservationLayout
 from kinarm.policies.normalizer import Normalizer, fold_normalizer
 from kinarm.policies.policy import Policy
 
@@ -34,14 +34,13 @@ def perturbations(rng: np.random.Generator, shape: tuple[int, ...]) -> Array:
     return numbers[:, :half].reshape(-1)[:count].reshape(shape)
 
 
-def first_deviations(n_joints: int) -> Array:
+def first_deviations(layout: ObservationLayout) -> Array:
     """Standard deviations of the first layer's initial weights, shape (n_observations,).
 
     All parts of the observation count alike, or the few entries of the goal would drown.
     """
-    parts = list(part_slices(n_joints).values())
-    sizes = np.array([part.stop - part.start for part in parts])
-    return np.repeat(DEVIATION / np.sqrt(len(parts) * sizes), sizes)
+    sizes = np.array([layout.length(part) for part in layout.parts] * layout.history)
+    return np.repeat(DEVIATION / np.sqrt(len(sizes) * sizes), sizes)
 
 
 def initial_network(rng: np.random.Generator, deviations: Array, widths: Sequence[int]) -> Array:

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from kinarm.errors import InvalidInputError, MissingExtraError
 from kinarm.networks import Activation, Layer
-from kinarm.observation import observation_size
+from kinarm.observation_layout import ObservationLayout
 from kinarm.policies.provenance import Provenance, package_versions
 from kinarm.problem import ReachProblem
 
@@ -104,7 +104,7 @@ def policy_of_pieces(
         If they cannot be converted, or numbers of entries do not fit.
     """
     arm = problem.load_arm()
-    n_observations, n_actions = observation_size(arm.n_joints), arm.n_actuated
+    n_observations, n_actions = ObservationLayout.of(problem, arm).size, arm.n_actuated
     layers, activations = chained(pieces, n_observations)
     if len(layers[-1].bias) != n_actions:
         raise InvalidInputError(

@@ -14,7 +14,7 @@ import numpy as np
 
 from kinarm._files import reading
 from kinarm.errors import InvalidInputError, MissingExtraError, PolicyFileError
-from kinarm.observation import part_slices
+from kinarm.observation_layout import ObservationLayout
 from kinarm.problem import ReachProblem
 
 FAMILIES = ("TQCPolicy", "SACPolicy", "TD3Policy", "ActorCriticPolicy")
@@ -152,7 +152,7 @@ def load_vec_normalize(given: Any) -> Any:
     return given
 
 
-def check_not_normalized(last: Any, n_joints: int, model: Path) -> None:
+def check_not_normalized(last: Any, layout: ObservationLayout, model: Path) -> None:
     """Refuse a model whose last observations in training were evidently normalised.
 
     Observations hold the orientations of the joints, quaternions of norm 1.
@@ -163,17 +163,18 @@ def check_not_normalized(last: Any, n_joints: int, model: Path) -> None:
     last : ndarray, mapping or None
         The last observations of its training, shape (n_envs, n_observations),
         or their parts.
-    n_joints : int
-        Number of joints of the arm.
+    layout : ObservationLayout
+        Where they are, if they are shown at all.
     model : Path
         The model's file.
     """
-    start = part_slices(n_joints)["orientation"].start
+    shown, place = np.arange(layout.size), layout.places.get("orientation")
     if isinstance(last, dict):  # of a goal-conditioned environment, whose goals are apart
-        last, start = last.get("observation"), 0
-    if last is None:
+        last, shown = last.get("observation"), layout.entries(of_goal=False)
+    if last is None or place is None:
         return
-    quaternions = np.asarray(last)[:, start : start + 4 * n_joints].reshape(-1, 4)
+    columns = np.searchsorted(shown, np.arange(place.start, place.stop))
+    quaternions = np.asarray(last)[:, columns].reshape(-1, 4)
     changed = np.abs(np.linalg.norm(quaternions, axis=1) - 1) > ROUNDING
     if changed.mean() < 0.5:
         return

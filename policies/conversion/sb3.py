@@ -3,18 +3,19 @@
 A model sees the observation, whole or in parts. The statistics that normalise it lie apart.
 """
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from gymnasium.spaces import Box, Dict
+from numpy.typing import NDArray
 
 from kinarm.envs.environment import Interface
 from kinarm.envs.goal import GoalInterface
 from kinarm.errors import InvalidInputError
 from kinarm.networks import Layer
-from kinarm.observation import OBSERVATION, part_slices
+from kinarm.observation_layout import ObservationLayout
 from kinarm.policies.conversion.layers import (
     WHOLE,
     Piece,
@@ -79,7 +80,7 @@ def policy_from_sb3(
         raise InvalidInputError(NO_PROBLEM)
     simulator = Simulator(own, threads=1)
     interface, selection, sizes = model_inputs(model.policy, simulator)
-    statistics, origin = _statistics_of(model, vec_normalize, simulator.arm.n_joints)
+    statistics, origin = _statistics_of(model, vec_normalize, simulator.world.layout)
     model.policy.set_training_mode(False)
     config = {
         key: value
@@ -115,7 +116,9 @@ def policy_from_sb3(
     return policy
 
 
-def _statistics_of(model: SB3Model, asked: Any, n_joints: int | None) -> tuple[Any, str | None]:
+def _statistics_of(
+    model: SB3Model, asked: Any, layout: ObservationLayout | None
+) -> tuple[Any, str | None]:
     """The ``VecNormalize`` of a model's observations, or None, and where it is from to tell."""
     from stable_baselines3.common.vec_env import unwrap_vec_normalize
 
@@ -131,8 +134,8 @@ def _statistics_of(model: SB3Model, asked: Any, n_joints: int | None) -> tuple[A
         return statistics, "VecNormalize of its environment"
     if model.file is None:
         return None, None
-    if n_joints is not None:
-        check_not_normalized(model.attributes.get("_last_obs"), n_joints, model.file)
+    if layout is not None:
+        check_not_normalized(model.attributes.get("_last_obs"), layout, model.file)
     return None, NONE
 
 
@@ -175,8 +178,7 @@ def native_statistics(
     if not wrapped:
         _check_actions(model.policy.action_space, simulator)
         _check_observations(model.policy.observation_space, Interface(simulator), simulator)
-    n_joints = None if wrapped else simulator.arm.n_joints
-    return _statistics_of(model, vec_normalize, n_joints)
+    return _statistics_of(model, vec_normalize, None if wrapped else simulator.world.layout)
 
 
 def model_inputs(policy: Any, simulator: Simulator) -> tuple[Interface, Layer, dict[str, int]]:
@@ -231,12 +233,11 @@ def _check_observations(space: Any, interface: Interface, simulator: Simulator) 
                 f"the model sees {frames} observations at once (a frame stack): kinarm's policies "
                 "see one"
             )
-    places = part_slices(simulator.arm.n_joints)
-    goals = [places[part.name] for part in OBSERVATION if part.of_goal]
-    of_goal = {WHOLE: goals, "desired_goal": [slice(None)]}
+    goals = simulator.world.layout.entries(of_goal=True)
+    of_goal = {WHOLE: goals, "desired_goal": np.arange(3)}
     theirs, ours = _parts(space), _parts(own)
     same = theirs.keys() == ours.keys()
-    if not same or not all(_agree(theirs[key], ours[key], of_goal.get(key, ())) for key in ours):
+    if not same or not all(_agree(theirs[key], ours[key], of_goal.get(key)) for key in ours):
         raise InvalidInputError(
             f"the model's observations, {_described(space)}, are not those of arm "
             f"{simulator.arm.name!r}, {_described(own)}, within its bounds: was it trained in "
@@ -256,12 +257,12 @@ def _described(space: Any) -> str:
     return f"{type(space).__name__} of shape {space.shape}"
 
 
-def _agree(first: Any, second: Any, but_for: Iterable[slice] = ()) -> bool:
+def _agree(first: Any, second: Any, but_for: NDArray[np.int64] | None) -> bool:
     """Whether two boxes have the same shape and, but for some entries, bounds."""
     if first.shape != second.shape:
         return False
     ends, others = [first.low, first.high], [second.low, second.high]
     alike = np.isclose(ends, others, rtol=0, atol=ROUNDING)
-    for part in but_for:  # goals lie elsewhere in other problems
-        alike[:, part] = True
+    if but_for is not None:  # goals lie elsewhere in other problems
+        alike[:, but_for] = True
     return bool(alike.all())

@@ -58,7 +58,8 @@ def sb3_vec_env(
     render_mode, width, height, camera
         As for `kinarm.ReachEnv`.
     **overrides
-        As for `kinarm.ReachProblem.replace`: ``horizon``, ``reward`` ...
+        As for `kinarm.ReachProblem.replace`: ``horizon``, ``reward`` ...; and
+        ``extra_observation``, as for `kinarm.ReachEnv`.
 
     Raises
     ------

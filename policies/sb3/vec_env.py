@@ -118,7 +118,7 @@ class SB3VecEnv(Lifecycle, VecEnv):
         self._episodes = episodes = self.simulator.reset(starts, goals)
         self._starts[:], self._returns[:] = episodes.q, 0.0
         self._announce(episodes, np.arange(self.num_envs))
-        return self.interface.observe(episodes.observation)
+        return self.interface.show(episodes)
 
     def set_options(self, options: Any = None) -> None:
         """Set ``start`` and ``goal`` of the next reset.
@@ -178,7 +178,7 @@ class SB3VecEnv(Lifecycle, VecEnv):
             }
             if self._share:
                 columns["replayed"] = self._replayed
-            finals = one_by_one(self.interface.observe(episodes.observation[ended]), ended.size)
+            finals = one_by_one(self.interface.show(episodes, ended), ended.size)
             elapsed = round(time.time() - self._made, 6)
             for row, final in zip(ended.tolist(), finals, strict=True):
                 total, length = self._returns[row].item(), episodes.steps[row].item()
@@ -189,7 +189,7 @@ class SB3VecEnv(Lifecycle, VecEnv):
                     "episode": {"r": total, "l": length, "t": elapsed},
                 }
             self._renew(episodes, ended)
-        observations = self.interface.observe(episodes.observation)
+        observations = self.interface.show(episodes)
         return observations, reward.astype(np.float32), dones, infos
 
     def _renew(self, episodes: Episodes, rows: NDArray[np.int64]) -> None:

@@ -5,7 +5,6 @@ import pytest
 
 from kinarm.errors import InvalidInputError
 from kinarm.networks import CompiledPolicy, Layer, Mirror, Networks, split_parameters
-from kinarm.observation import observation_signs
 
 
 class Offering:
@@ -99,7 +98,7 @@ class TestForm:
 
 class TestMirror:
     def test_reflects_what_has_its_goal_on_the_left(self, simulator):
-        signs = observation_signs(6)
+        signs = simulator.world.layout.signs(np.ones(6))
         mirror = Mirror(signs, np.ones(5))
         seen = simulator.world.observe(*simulator.sample(np.random.default_rng(3), 50))
         left = mirror.on_the_left(seen)

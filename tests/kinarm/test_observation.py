@@ -9,14 +9,9 @@ from configurations import random_configurations
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from kinarm.observation import (
-    Ranges,
-    observation_bounds,
-    observation_layout,
-    observation_signs,
-    observation_size,
-    part_slices,
-)
+from kinarm.observation import Ranges
+from kinarm.observation_layout import ObservationLayout, observation_layout
+from kinarm.problem import PROBLEMS
 
 REFLECTION = np.array([1.0, -1.0, 1.0])
 
@@ -32,7 +27,7 @@ def situations(any_simulator):
 class TestParts:
     def test_equal_pinocchio(self, any_simulator, situations):
         arm, world = any_simulator.arm, any_simulator.world
-        places = part_slices(arm.n_joints)
+        places = world.layout.places
         data = arm.model.createData()
         distances = world.distances(*situations[:2])
         for q, goal, seen, distance in zip(*situations, distances, strict=True):
@@ -53,22 +48,25 @@ class TestParts:
 class TestTable:
     @pytest.mark.parametrize("n_joints", [1, 3, 6, 7])
     def test_parts_fill_the_observation_one_after_the_other(self, n_joints):
-        slices = list(part_slices(n_joints).values())
+        layout = ObservationLayout.sized(PROBLEMS["right"], n_joints, n_joints)
+        slices = list(layout.places.values())
         assert slices[0].start == 0
         for before, after in itertools.pairwise(slices):
             assert before.stop == after.start
-        assert slices[-1].stop == observation_size(n_joints) == 6 + 7 * n_joints
-        assert len(observation_signs(n_joints)) == observation_size(n_joints)
+        assert slices[-1].stop == layout.size == 6 + 7 * n_joints
+        assert len(layout.signs(np.ones(n_joints))) == layout.size
 
     def test_layout_names_version_parts_and_lengths(self):
-        assert observation_layout() == ("1: goal 3, goal_minus_tool 3, orientation 4n, position 3n")
+        layout = "1: goal 3, goal_minus_tool 3, orientation 4n, position 3n"
+        assert observation_layout(PROBLEMS["right"]) == layout
 
 
 class TestSigns:
     def test_are_those_of_the_reflection_by_pinocchio(self, any_simulator, situations):
         """A frame R, p reflected about y = 0 is S R S, S p with S = diag(1, -1, 1)."""
         arm = any_simulator.arm
-        places, signs = part_slices(arm.n_joints), observation_signs(arm.n_joints)
+        layout = any_simulator.world.layout
+        places, signs = layout.places, layout.signs(np.ones(arm.n_joints))
         data = arm.model.createData()
         for q, goal, seen in zip(*situations, strict=True):
             reflected = seen * signs
@@ -95,8 +93,8 @@ class TestBounds:
         world, rng = simulators[name].world, np.random.default_rng(seed)
         lower = rng.normal(size=3)
         upper = lower + rng.random(3)
-        ranges = Ranges(goal_lower=lower, goal_upper=upper, reach=world.arm.reach)
-        low, high = observation_bounds(ranges, world.arm.n_joints)
+        ranges = Ranges(lower, upper, world.arm.reach, world.arm.lower, world.arm.upper)
+        low, high = world.layout.bounds(ranges)
         q = rng.uniform(world.arm.lower, world.arm.upper, (50, world.arm.n_joints))
         seen = world.observe(q, rng.uniform(lower, upper, (50, 3)))
         assert (seen >= low).all()
@@ -104,7 +102,8 @@ class TestBounds:
 
     def test_by_hand(self):
         lower, upper = np.array([0.0, -1, 2]), np.array([1.0, 0, 3])
-        low, high = observation_bounds(Ranges(lower, upper, 0.5), 1)
+        layout = ObservationLayout.sized(PROBLEMS["right"], 1, 1)
+        low, high = layout.bounds(Ranges(lower, upper, 0.5, np.zeros(1), np.ones(1)))
         np.testing.assert_array_equal(low[:6], [0, -1, 2, -0.5, -1.5, 1.5])
         np.testing.assert_array_equal(high[:6], [1, 0, 3, 1.5, 0.5, 3.5])
         np.testing.assert_allclose([low[6:10], high[6:10]], [[-1] * 4, [1] * 4], atol=2e-6)

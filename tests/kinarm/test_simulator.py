@@ -17,7 +17,6 @@ from kinarm.errors import InvalidInputError, KinarmError, StartInContactError
 from kinarm.kernels.rollout import advance, begin
 from kinarm.kernels.screening import screen
 from kinarm.networks import Layer, Mirror, Networks
-from kinarm.observation import observation_signs
 from kinarm.problem import ReachProblem
 from kinarm.recording import record_path
 from kinarm.reference import ReferenceSimulator
@@ -330,8 +329,8 @@ class TestBatchesThatServeAgain:
 
 def test_kernels_are_compiled_once_for_all(simulators, scenarios):
     """Whatever the arm and the policy, and for copies, too."""
-    mirror = Mirror(observation_signs(6), np.ones(5))
-    for array in mirror:
+    mirror = Mirror(simulators["paper"].world.layout.signs(np.ones(6)), np.ones(5))
+    for array in mirror[:2]:
         array.flags.writeable = False
     simulator = simulators["paper"]
     networks = linear_policies(simulator, 1, 26)

@@ -8,7 +8,7 @@ from numba import njit
 from scipy import stats
 
 from kinarm.kernels.lanes import LANES
-from kinarm.observation import part_slices
+from kinarm.observation_layout import ObservationLayout
 from kinarm.policies import ARSConfig, train_policy
 from kinarm.policies.ars.networks import (
     first_deviations,
@@ -20,6 +20,7 @@ from kinarm.policies.ars.networks import (
     perturbed_networks,
 )
 from kinarm.policies.normalizer import Normalizer
+from kinarm.problem import PROBLEMS
 from kinarm.simulator import Simulator
 
 WIDTHS = (7, 5, 3, 2)
@@ -52,8 +53,8 @@ def test_first_network_does_nothing_and_has_lively_inner_layers():
 
 @pytest.mark.parametrize("n_joints", [5, 7])
 def test_all_parts_of_an_observation_are_heard_alike(n_joints):
-    deviations = first_deviations(n_joints)
-    parts = part_slices(n_joints).values()
+    layout = ObservationLayout.sized(PROBLEMS["right"], n_joints, n_joints)
+    deviations, parts = first_deviations(layout), layout.places.values()
     heard = [np.square(deviations[part]).sum() for part in parts]
     assert len(deviations) == max(part.stop for part in parts)
     np.testing.assert_allclose(heard, 1.5**2 / len(heard))

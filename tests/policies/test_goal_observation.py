@@ -11,22 +11,23 @@ from kinarm.policies.policy import flat_observation
 
 @pytest.fixture
 def shown(simulator):
-    """Observations of some arms, flat and as a dictionary."""
+    """Observations of some arms, flat and as a dictionary, and their layout."""
     flat = simulator.world.observe(*simulator.sample(np.random.default_rng(0), 30))
-    return flat, GoalInterface(simulator).observe(flat)
+    return flat, GoalInterface(simulator).observe(flat), simulator.world.layout
 
 
 def test_is_what_the_environment_split(shown):
-    flat, parts = shown
-    np.testing.assert_allclose(flat_observation(parts, 48), flat, rtol=0, atol=1e-15)
+    flat, parts, layout = shown
+    np.testing.assert_allclose(flat_observation(parts, layout), flat, rtol=0, atol=1e-15)
     one = {name: part[3] for name, part in parts.items()}
-    np.testing.assert_allclose(flat_observation(one, 48), flat[3], rtol=0, atol=1e-15)
+    np.testing.assert_allclose(flat_observation(one, layout), flat[3], rtol=0, atol=1e-15)
 
 
 def test_arms_of_other_joints(any_simulator):
     flat = any_simulator.world.observe(*any_simulator.sample(np.random.default_rng(0), 5))
     parts = GoalInterface(any_simulator).observe(flat)
-    np.testing.assert_allclose(flat_observation(parts, flat.shape[1]), flat, rtol=0, atol=1e-15)
+    layout = any_simulator.world.layout
+    np.testing.assert_allclose(flat_observation(parts, layout), flat, rtol=0, atol=1e-15)
 
 
 @pytest.mark.parametrize(
@@ -42,7 +43,7 @@ def test_arms_of_other_joints(any_simulator):
 def test_others_are_refused(shown, change, message):
     one = {name: part[0] for name, part in shown[1].items()}
     with pytest.raises(InvalidInputError, match=message):
-        flat_observation({**one, **change}, 48)
+        flat_observation({**one, **change}, shown[2])
 
 
 class TestPredict:

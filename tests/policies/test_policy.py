@@ -9,8 +9,9 @@ import pytest
 from kinarm.arm import Arm
 from kinarm.errors import InvalidInputError, OutputError, PolicyFileError
 from kinarm.networks import Mirror
-from kinarm.observation import observation_layout
+from kinarm.observation_layout import observation_layout
 from kinarm.policies.policy import Layer, Policy
+from kinarm.problem import PROBLEMS
 
 FUNCTIONS = {"linear": lambda x: x, "tanh": np.tanh, "relu": lambda x: np.maximum(x, 0)}
 MIRROR = Mirror(np.tile([1.0, -1, 1], 16), np.array([-1.0, 1, 1, -1, 1]))
@@ -32,7 +33,7 @@ def assert_bitwise_equal(first, second):
     assert (first.mirror is None) == (second.mirror is None)
     if first.mirror is not None:
         for a, b in zip(first.mirror, second.mirror, strict=True):
-            assert a.tobytes() == b.tobytes()
+            np.testing.assert_array_equal(a, b)
     assert first.provenance == second.provenance
 
 
@@ -254,7 +255,7 @@ class TestBadFile:
     def test_observations_of_another_layout(self, saved):
         header = json.loads(str(contents(saved)["header"])) | {"observation": "0: goal 3"}
         np.savez(saved, **{**contents(saved), "header": json.dumps(header)})
-        self.refused(saved, f"layout '0: goal 3', not '{observation_layout()}'")
+        self.refused(saved, f"layout '0: goal 3', not '{observation_layout(PROBLEMS['right'])}'")
 
     def test_half_a_mirror(self, make_policy, saved):
         make_policy(mirror=MIRROR).save(saved)

@@ -11,7 +11,6 @@ from gymnasium.envs.registration import EnvSpec
 from kinarm.envs import UnexpectedArgumentError
 from kinarm.envs.reach import ReachEnv
 from kinarm.errors import InvalidInputError, ProblemError, UnknownNameError
-from kinarm.observation import OBSERVATION, part_slices
 from kinarm.problem import ReachProblem
 from kinarm.scene import GoalRegion, Scene
 from kinarm.task import RewardWeights
@@ -143,5 +142,6 @@ class TestSettings:
 
     def test_docstring_holds_the_table_of_the_observation(self):
         words = " ".join(ReachEnv.__doc__.split())
-        for part, place in zip(OBSERVATION, part_slices(6).values(), strict=True):
+        layout = ReachEnv().simulator.world.layout
+        for part, place in zip(layout.parts, layout.places.values(), strict=True):
             assert f"{place.start}-{place.stop - 1} {part.meaning} {part.unit}" in words

@@ -7,7 +7,6 @@ import pytest
 from kinarm.envs.goal import ReachGoalEnv, ReachGoalVectorEnv
 from kinarm.envs.reach import ReachEnv
 from kinarm.errors import InvalidInputError
-from kinarm.observation import part_slices
 
 NAMES = [f"kinarm/ReachGoal{task}-v0" for task in ("Left", "Right", "Both")]
 HOME = np.zeros(6)
@@ -64,7 +63,7 @@ def test_rewards_of_many_goals_at_once(reward_type):
 def test_observation_is_that_of_the_flat_environment_taken_apart():
     flat, goal = ReachEnv("both"), ReachGoalEnv("both")
     plain, parts = flat.reset(seed=5)[0], goal.reset(seed=5)[0]
-    places = part_slices(6)
+    places = flat.simulator.world.layout.places
     own = np.concatenate([plain[places["orientation"]], plain[places["position"]]])
     np.testing.assert_array_equal(parts["observation"], own)
     np.testing.assert_array_equal(parts["desired_goal"], plain[:3])

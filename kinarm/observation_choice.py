@@ -1,0 +1,65 @@
+"""Which parts of the observation a problem shows; the parts are in `kinarm.observation`."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from typing import Any, cast
+
+from kinarm._fields import OPTIONAL, Checked, init_fields
+from kinarm.errors import ProblemError, UnknownNameError
+
+PAPER_PARTS = ("goal", "goal_minus_tool", "orientation", "position")
+"""The paper's observation (section 3.2)."""
+
+LONGEST_HISTORY, MOST_SLOTS = 32, 32
+
+
+@dataclass(frozen=True, kw_only=True)
+class Observation(Checked):
+    """What a policy sees.
+
+    Parameters
+    ----------
+    parts : tuple of str, optional
+        Names of the parts in their order; by default those of the paper.
+    obstacle_slots : int
+        Bodies that the part ``obstacles`` shows, the nearest first, from 1 to
+        32.
+    history : int
+        Steps whose observations are shown, the last one first, from 1 to 32.
+        Those before the start are like the first.
+    """
+
+    parts: tuple[str, ...] | None = None
+    obstacle_slots: int = field(default=4, metadata={**OPTIONAL, "at_most": MOST_SLOTS})
+    history: int = field(default=1, metadata={**OPTIONAL, "at_most": LONGEST_HISTORY})
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.parts is None:
+            return
+        from kinarm.observation import OBSERVATION  # loads Numba
+
+        available = [part.name for part in OBSERVATION]
+        if not self.parts:
+            raise ProblemError(f"an observation needs parts; available: {', '.join(available)}")
+        for name in self.parts:
+            if name not in available:
+                raise UnknownNameError("part of the observation", name, available)
+            if self.parts.count(name) > 1:
+                raise ProblemError(f"the observation has the part {name!r} twice")
+
+    def changed(self, change: Any) -> "Observation":
+        """Another one, or with other parts, in a list, or other fields, in a mapping."""
+        if isinstance(change, list | tuple):
+            change = {"parts": change}
+        if not isinstance(change, Mapping):
+            return cast("Observation", change)
+        for name in change:
+            if name not in init_fields(Observation):
+                raise UnknownNameError("field of an observation", name, init_fields(Observation))
+        return replace(self, **change)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the parts."""
+        return PAPER_PARTS if self.parts is None else self.parts

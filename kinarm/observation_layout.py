@@ -1,0 +1,142 @@
+"""Where the parts of an observation are, for an arm."""
+
+from collections.abc import Mapping
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from kinarm.arm import Arm
+from kinarm.errors import InvalidInputError, ProblemError
+from kinarm.kernels.compiling import Array
+from kinarm.observation import ACTUATED, JOINTS, OBSERVATION, ONCE, SLOTS, VERSION, Part, Ranges
+from kinarm.problem import ReachProblem
+
+
+class ObservationLayout(NamedTuple):
+    """Where the parts of a problem's observation are.
+
+    Attributes
+    ----------
+    parts : tuple of Part
+        The parts of a step's observation, one after the other.
+    counts : mapping of str to int
+        How often those of each kind (`Part.of`) are there.
+    history : int
+        Steps that are shown, the last one first.
+    """
+
+    parts: tuple[Part, ...]
+    counts: Mapping[str, int]
+    history: int = 1
+
+    @classmethod
+    def of(cls, problem: ReachProblem, arm: Arm) -> "ObservationLayout":
+        """The layout of a problem and its arm; ProblemError if they cannot have a part."""
+        layout = cls.sized(problem, arm.n_joints, arm.n_actuated)
+        for part in layout.parts:
+            if reason := part.lacks(arm, problem.scene):
+                raise ProblemError(f"the observation cannot have {part.name!r}: {reason}")
+        return layout
+
+    @classmethod
+    def sized(cls, problem: ReachProblem, n_joints: int, n_actuated: int) -> "ObservationLayout":
+        """The layout for an arm with so many joints."""
+        known, chosen = {part.name: part for part in OBSERVATION}, problem.observation
+        parts = tuple(known[name] for name in chosen.names)
+        counts = {ONCE: 1, JOINTS: n_joints, ACTUATED: n_actuated, SLOTS: chosen.obstacle_slots}
+        return cls(parts, counts, chosen.history)
+
+    def length(self, part: Part) -> int:
+        """Number of entries of a part in the observation of a step."""
+        return len(part.signs) * self.counts[part.of]
+
+    @property
+    def width(self) -> int:
+        """Length of the observation of a step."""
+        return sum(map(self.length, self.parts))
+
+    @property
+    def size(self) -> int:
+        """Length of an observation."""
+        return self.width * self.history
+
+    @property
+    def places(self) -> dict[str, slice]:
+        """Place of each part, by name, in the last step's observation, which comes first."""
+        ends = np.cumsum([self.length(part) for part in self.parts]).tolist()
+        pairs = zip(self.parts, ends, strict=True)
+        return {part.name: slice(end - self.length(part), end) for part, end in pairs}
+
+    @property
+    def shown(self) -> NDArray[np.uint32]:
+        """First entry of each part of `OBSERVATION`, and how often it is there, for kernels."""
+        table = np.zeros((len(OBSERVATION), 2), dtype=np.uint32)
+        for part, place in zip(self.parts, self.places.values(), strict=True):
+            table[OBSERVATION.index(part)] = place.start, self.counts[part.of]
+        return table
+
+    @property
+    def side(self) -> int | None:
+        """Entry of the goal's y, which is positive on the left [m]; None if it is not shown."""
+        goal = self.places.get("goal")
+        return None if goal is None else goal.start + 1
+
+    @property
+    def goal_places(self) -> tuple[slice, slice]:
+        """Places of the goal, and of goal minus tool; InvalidInputError if one is not shown."""
+        try:
+            return self.places["goal"], self.places["goal_minus_tool"]
+        except KeyError as error:
+            raise InvalidInputError(
+                f"goals as a dictionary need the part {error} of the observation, which has "
+                f"{', '.join(self.places)}"
+            ) from error
+
+    @property
+    def sees_bodies(self) -> bool:
+        """Whether a part tells of bodies of the scene."""
+        return bool({"proximity", "obstacles"} & self.places.keys())
+
+    def entries(self, *, of_goal: bool) -> NDArray[np.int64]:
+        """Entries of the parts that depend on the goal, or of the others, of all steps."""
+        chosen = np.concatenate([np.full(self.length(p), p.of_goal == of_goal) for p in self.parts])
+        return np.flatnonzero(np.tile(chosen, self.history))
+
+    def signs(self, axes: Array) -> Array:
+        """Signs of entries in the reflection y -> -y, shape (n_observations,).
+
+        Takes those of the joints, shape (n_joints,).
+        """
+        signs = []
+        for part in self.parts:
+            rows = np.tile(np.array(part.signs, dtype=np.float64), (self.counts[part.of], 1))
+            of_joint = axes[: len(rows), None] if 0 in part.signs else 1.0
+            signs.append(np.where(rows == 0, of_joint, rows).ravel())
+        return np.tile(np.concatenate(signs), self.history)
+
+    def bounds(self, ranges: Ranges) -> tuple[Array, Array]:
+        """Lowest and highest values of the entries, shape (n_observations,) each."""
+        pairs = [(part, part.bounds(ranges)) for part in self.parts]
+        lower, upper = (
+            np.concatenate([self._repeated(part, each[end]) for part, each in pairs])
+            for end in (0, 1)
+        )
+        return np.tile(lower, self.history), np.tile(upper, self.history)
+
+    def _repeated(self, part: Part, values: ArrayLike) -> Array:
+        """Values of a part's entries, given for all joints, for one, or one for all."""
+        array = np.asarray(values, dtype=np.float64)
+        if array.shape == (self.length(part),):
+            return array
+        once = np.broadcast_to(array, len(part.signs))
+        return np.tile(once, self.counts[part.of])
+
+
+def observation_layout(problem: ReachProblem) -> str:
+    """Names and lengths of a problem's parts, to compare."""
+    layout, chosen = ObservationLayout.sized(problem, 1, 1), problem.observation
+    parts = (f"{part.name} {len(part.signs)}{part.of}" for part in layout.parts)
+    slots = f"; k = {chosen.obstacle_slots}" if any(p.of == SLOTS for p in layout.parts) else ""
+    history = f"; history {chosen.history}" if chosen.history > 1 else ""
+    return f"{VERSION}: {', '.join(parts)}{slots}{history}"
