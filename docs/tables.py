@@ -25,7 +25,8 @@ from kinarm.evaluation import METRICS
 from kinarm.evaluation.commands import arms, problem
 from kinarm.evaluation.outcomes import HOLDING_STEPS
 from kinarm.evaluation.report.templating import markdown_table
-from kinarm.observation import OBSERVATION, part_slices
+from kinarm.observation import ACTUATED, JOINTS, OBSERVATION, ONCE, SLOTS, Part
+from kinarm.observation_layout import ObservationLayout
 from kinarm.policies import find_learner
 
 DOCS = Path(__file__).parent
@@ -135,20 +136,36 @@ def reward_table() -> str:
     return markdown_table(["term", "weight by default", "what the weight is"], rows)
 
 
-def observation_table(n_joints: int) -> str:
-    """Parts of the observation."""
-    places = part_slices(n_joints)
+def observation_table() -> str:
+    """Parts of the paper's observation, for an arm of six joints."""
+    layout = ObservationLayout.sized(PROBLEMS["right"], 6, 5)
+    places = [f"{place.start} to {place.stop - 1}" for place in layout.places.values()]
+    return parts_table("index", dict(zip(layout.parts, places, strict=True)))
+
+
+def all_parts_table() -> str:
+    """Parts of observations that problems may choose."""
+    owners = {JOINTS: "joint", ACTUATED: "actuated joint", SLOTS: "slot"}
+    lengths = {
+        part: f"{len(part.signs)}{' per ' * (part.of != ONCE)}{owners.get(part.of, '')}"
+        for part in OBSERVATION
+    }
+    return parts_table("entries", lengths)
+
+
+def parts_table(title: str, column: Mapping[Part, str]) -> str:
+    """A table of parts, with a first column of its own."""
     rows = [
         [
-            f"{places[part.name].start} to {places[part.name].stop - 1}",
+            first,
             f"`{part.name}`",
             part.meaning,
             part.unit,
-            f"`{' '.join(f'{sign:+d}'[0] for sign in part.signs)}`",
+            f"`{' '.join(f'{sign:+d}'[0] if sign else 'j' for sign in part.signs)}`",
         ]
-        for part in OBSERVATION
+        for part, first in column.items()
     ]
-    return markdown_table(["index", "part", "meaning", "unit", "signs in the mirror"], rows)
+    return markdown_table([title, "part", "meaning", "unit", "signs in the mirror"], rows)
 
 
 def recipe_table(recipes: Mapping[str, object]) -> str:
@@ -251,7 +268,8 @@ TABLES = {
     "problems": problems_table,
     "programs": programs_table,
     "reward": reward_table,
-    "observation": lambda: observation_table(6),
+    "observation": observation_table,
+    "observation-parts": all_parts_table,
     "metrics": metrics_table,
     "symbols": symbols_table,
     "ars-recipes": lambda: recipe_table(find_learner("ars").recipes),
