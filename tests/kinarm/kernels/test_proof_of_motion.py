@@ -55,6 +55,16 @@ def test_bounds_of_intervals_hold_and_are_attained(below, parts, turn):
     assert (doubt[free] == 0).all()
 
 
+def test_steps_are_looked_at_from_their_beginning(below):
+    """However fast the ball leaves, the first interval is in doubt if it begins too low."""
+    (simulator, level), gaps = below, np.array([1.2e-6, 2.1e-6])
+    starts, ends = dipping(level, np.zeros((2, 3)), np.zeros(2), gaps)
+    ends[:, 0] += 0.1
+    bounds, doubt, _ = proofs(simulator, 0, starts, ends)
+    assert (bounds <= gaps + 1e-12).all()
+    np.testing.assert_array_equal(doubt, [1, 0])
+
+
 def test_parts_are_open_where_a_parabola_comes_to_the_margin():
     """Of heights that bend as much as they may everywhere, to just below the margin in a part."""
     found, rng = njit(lambda *given: open_parts(*given)), np.random.default_rng(2)
