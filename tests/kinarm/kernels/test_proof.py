@@ -48,8 +48,8 @@ def test_nothing_is_claimed_between_margin_and_depth(below):
     ends[:, 0] = level + RADIUS + LENGTHS.sum() + gaps
     starts[:, 0] = ends[:, 0] + 0.1
     _, free, touching, _ = simulator.world.proven(ends)
-    np.testing.assert_array_equal(free, gaps > MARGIN)
-    np.testing.assert_array_equal(touching, gaps < -DEPTH)
+    np.testing.assert_array_equal(free, gaps > 2e-6)
+    np.testing.assert_array_equal(touching, gaps < -1e-6)
     _, doubt, touching = proofs(simulator, 1, starts, ends)
-    np.testing.assert_array_equal(doubt, gaps <= MARGIN)
-    np.testing.assert_array_equal(touching, gaps < -DEPTH)
+    np.testing.assert_array_equal(doubt, gaps <= 2e-6)
+    np.testing.assert_array_equal(touching, gaps < -1e-6)
