@@ -31,7 +31,8 @@ class Ranges(NamedTuple):
     """Ranges of the entries of an observation in a problem.
 
     A box of all goals with tolerance, a bound on the distance from the world's origin to any point
-    of the arm [m], and the joints' limits [rad or m].
+    of the arm [m], the joints' limits [rad or m], and the actuated ones' largest velocities, as
+    fractions of theirs; joints and velocities as they are measured.
     """
 
     goal_lower: Array
@@ -39,6 +40,7 @@ class Ranges(NamedTuple):
     reach: float
     lower: Array
     upper: Array
+    fastest: Array
 
 
 class Part(NamedTuple):
@@ -243,7 +245,7 @@ OBSERVATION = (
         meaning="velocity of each actuated joint in the last step, as a fraction of its limit",
         unit="1",
         signs=(0,),
-        bounds=lambda _: (-UNIT, UNIT),
+        bounds=lambda ranges: (-ranges.fastest, ranges.fastest),
         write=_write_velocities,
         of=ACTUATED,
     ),

@@ -115,6 +115,9 @@ class Plant(Checked):
         return value if isinstance(value, tuple) else (value, value)
 
 
+MOST_NOISE = 3.5
+"""Largest noise in standard deviations."""
+
 RANGES = tuple(item.name for item in fields(Plant) if item.name not in ("order", "feedback"))
 """Names of the settings that an episode draws, in the order of `PlantDraws.ranges`."""
 

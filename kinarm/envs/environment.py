@@ -18,7 +18,8 @@ from kinarm.envs.extra import ExtraObservation
 from kinarm.envs.rendering import RENDER_MODES, EnvPictures
 from kinarm.episodes import Episodes, StepResult
 from kinarm.errors import InvalidInputError, UnknownNameError, one_or_many
-from kinarm.observation import Ranges
+from kinarm.observation import UNIT, Ranges
+from kinarm.plant import MOST_NOISE, RANGES
 from kinarm.problem import ProblemLike, ReachProblem
 from kinarm.scenarios import ScenarioQueues
 from kinarm.simulator import Simulator
@@ -123,15 +124,20 @@ def one_by_one(observations: Observations, count: int) -> list[Any]:
 
 
 def state_bounds(simulator: Simulator) -> tuple[Array, Array]:
-    """Bounds of an observation, with tolerances for goals and quaternions."""
-    task = simulator.task
+    """Bounds of an observation, with tolerances for goals, quaternions and measurements."""
+    task, arm, plant = simulator.task, simulator.arm, simulator.problem.plant
+    most = {name: plant.range_of(name)[1] for name in RANGES}
+    noise, resolution = MOST_NOISE * most["noise"], most["resolution"]
+    off = noise + resolution + most["bias"] + most["calibration"]
+    missed = task.tolerance + most["goal_bias"] + MOST_NOISE * most["goal_noise"]
     regions = [simulator.scene.goal_region(name) for name in task.goal_regions]
     ranges = Ranges(
-        goal_lower=np.min([region.lower for region in regions], axis=0) - task.tolerance,
-        goal_upper=np.max([region.upper for region in regions], axis=0) + task.tolerance,
-        reach=simulator.arm.reach,
-        lower=simulator.arm.lower,
-        upper=simulator.arm.upper,
+        goal_lower=np.min([region.lower for region in regions], axis=0) - missed,
+        goal_upper=np.max([region.upper for region in regions], axis=0) + missed,
+        reach=arm.reach,
+        lower=arm.lower - off,
+        upper=arm.upper + off,
+        fastest=UNIT + (2 * noise + resolution) / simulator.step_limit,
     )
     return simulator.world.layout.bounds(ranges)
 

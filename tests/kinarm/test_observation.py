@@ -93,7 +93,7 @@ class TestBounds:
         world, rng = simulators[name].world, np.random.default_rng(seed)
         lower = rng.normal(size=3)
         upper = lower + rng.random(3)
-        ranges = Ranges(lower, upper, world.arm.reach, world.arm.lower, world.arm.upper)
+        ranges = Ranges(lower, upper, world.arm.reach, world.arm.lower, world.arm.upper, np.ones(5))
         low, high = world.layout.bounds(ranges)
         q = rng.uniform(world.arm.lower, world.arm.upper, (50, world.arm.n_joints))
         seen = world.observe(q, rng.uniform(lower, upper, (50, 3)))
@@ -103,7 +103,7 @@ class TestBounds:
     def test_by_hand(self):
         lower, upper = np.array([0.0, -1, 2]), np.array([1.0, 0, 3])
         layout = ObservationLayout.sized(PROBLEMS["right"], 1, 1)
-        low, high = layout.bounds(Ranges(lower, upper, 0.5, np.zeros(1), np.ones(1)))
+        low, high = layout.bounds(Ranges(lower, upper, 0.5, *np.ones((3, 1))))
         np.testing.assert_array_equal(low[:6], [0, -1, 2, -0.5, -1.5, 1.5])
         np.testing.assert_array_equal(high[:6], [1, 0, 3, 1.5, 0.5, 3.5])
         np.testing.assert_allclose([low[6:10], high[6:10]], [[-1] * 4, [1] * 4], atol=2e-6)

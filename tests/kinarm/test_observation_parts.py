@@ -10,7 +10,7 @@ from configurations import random_configurations
 from random_scenes import random_scene
 from reference_episodes import held_actions, scripted
 
-from kinarm import Observation, ReachProblem, Simulator
+from kinarm import Observation, Plant, ReachProblem, Simulator
 from kinarm.bodies import Body, RandomBodies
 from kinarm.body_motion import BodyMotion
 from kinarm.errors import InvalidInputError, KinarmError
@@ -38,6 +38,8 @@ SCENES = {
     "moving": random_scene(3, 7, largest=0.25, moving=3),
     "random": Scene(random_bodies=(FALLING,)),
 }
+
+HARD = "benches", "hard"
 
 
 def simulator_of(parts=ALL, problem=BOTH, **settings):
@@ -74,6 +76,11 @@ class TestReference:
     def test_agrees_about_all_parts(self, scene, arm):
         settings = {"scene": SCENES[scene], "arm": arm, "horizon": 12}
         self.compare(simulator_of(history=3, obstacle_slots=5, **settings))
+
+    @pytest.mark.parametrize("feedback", ["measured", "commanded"])
+    def test_agrees_behind_a_plant(self, feedback):
+        plant = replace(Plant.load("hard"), feedback=feedback)
+        self.compare(simulator_of(history=2, scene=SCENES["moving"], horizon=12, plant=plant))
 
     def test_agrees_about_an_arm_that_slides(self, simulators):
         problem = simulators["sliding"].problem.replace(horizon=12)
@@ -234,11 +241,11 @@ class TestDeterminism:
 
 
 class TestBounds:
-    @pytest.mark.parametrize("scene", SCENES)
-    def test_contain_all_that_is_seen(self, scene):
+    @pytest.mark.parametrize(("scene", "plant"), [*((name, "ideal") for name in SCENES), HARD])
+    def test_contain_all_that_is_seen(self, scene, plant):
         from kinarm.envs.environment import state_bounds
 
-        simulator = simulator_of(scene=SCENES[scene], history=2)
+        simulator = simulator_of(scene=SCENES[scene], history=2, plant=plant)
         low, high = state_bounds(simulator)
         starts, goals = simulator.sample(np.random.default_rng(0), 40)
         actions = held_actions(simulator, np.random.default_rng(1), 40)[:, :20]
