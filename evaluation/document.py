@@ -56,7 +56,7 @@ class FacedProblem(Document, frozen=True, kw_only=True):
     digest: Digest
     trial_set_hash: Digest
     starts: list[list[float]]
-    goals: list[tuple[float, float, float]]
+    goals: list[list[float]]
     oracle: Bounds | None
 
     @property
@@ -289,7 +289,7 @@ class EvaluationDocument(Document, frozen=True, kw_only=True):
         """The trials of a problem; refused if their hash differs."""
         faced, simulator = self.faced(problem), Simulator(self.problem(problem))
         starts = finite_array("starts", faced.starts, (None, simulator.arm.n_joints))
-        goals = finite_array("goals", faced.goals, (len(starts), 3))
+        goals = finite_array("goals", faced.goals, (len(starts), simulator.world.goal_width))
         trials = TrialSet(simulator, self.protocol.seed, starts, goals)
         if trials.digest != faced.trial_set_hash:
             raise InvalidInputError(f"the trials of {problem} do not match their hash")

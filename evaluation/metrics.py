@@ -221,6 +221,22 @@ METRICS: dict[str, Metric] = {
         unit="s",
         digits=2,
     ),
+    "goals_per_minute": Metric(
+        meaning="goals of sequences that were reached, per minute of simulated time",
+        definition="60 Σ gᵢ / Σ kᵢ, by the duration of a step in seconds",
+        formula=lambda trials: trials.goals_per_minute,
+        heading="goals per minute",
+        digits=1,
+        priority=12,
+    ),
+    "median_turn": Metric(
+        meaning="median of the final errors of direction, rotation or joints over all trials",
+        definition="median of rᵢ",
+        formula=lambda trials: _median_or_none(trials.turn),
+        unit="rad",
+        heading="median turn rad",
+        priority=9,
+    ),
     "step_ratio": Metric(
         meaning="median of steps divided by the bound, over the bounded trials that succeeded",
         definition="median of kᵢ / bᵢ over the bounded i ∈ S",

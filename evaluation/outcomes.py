@@ -49,7 +49,10 @@ class Holding:
         paths = rollouts.paths[:, 1:]
         visited = ~np.isnan(paths[..., 0])
         tools = trials.simulator.world.poses(paths[visited])[:, :3, 3]
-        aims = np.broadcast_to(rollouts.goals[:, None], (*visited.shape, 3))[visited]
+        aims = rollouts.goal_paths[:, 1:, :3]
+        if not len(aims):
+            aims = np.broadcast_to(rollouts.goals[:, None, :3], (*visited.shape, 3))
+        aims = aims[visited]
         distances = np.full(visited.shape, np.nan)
         distances[visited] = np.linalg.norm(tools - aims, axis=1)
         at_end = distances[:, -HOLDING_STEPS:].max(axis=1)
@@ -66,7 +69,8 @@ def _joined(field: str, name: str, meaning: str) -> "cached_property[NDArray[Any
 
     def joined(self: "Outcomes") -> NDArray[Any]:
         columns = (getattr(seed, name) for seed in getattr(self, field))
-        chosen = [column if self.numbers is None else column[self.numbers] for column in columns]
+        numbers = self.numbers
+        chosen = [each if numbers is None or not len(each) else each[numbers] for each in columns]
         return np.concatenate(chosen, axis=-1)
 
     joined.__doc__ = meaning
@@ -115,6 +119,8 @@ class Outcomes:
     returns = _joined("rollouts", "returns", "Sums of rewards.")
     success = _joined("rollouts", "success", "Whether a trial ended in success.")
     collision = _joined("rollouts", "collision", "Whether a trial ended in contact.")
+    turn = _joined("rollouts", "turn", "Final errors of the goals' rests; empty if they have none.")
+    goals_reached = _joined("rollouts", "goals_reached", "Goals reached; empty if not counted.")
     closest = _joined("holding", "closest", "Closest approaches where success ends no trial [m].")
     farthest_at_end = _joined("holding", "farthest_at_end", "Largest last distances there [m].")
     holding_collision = _joined("holding", "collision", "Whether trials ended in contact there.")
@@ -128,6 +134,12 @@ class Outcomes:
     def ordered_closest(self) -> NDArray[np.float64]:
         """Closest approaches along the last axis, the smallest first [m]."""
         return np.sort(self.closest, axis=-1)
+
+    @property
+    def goals_per_minute(self) -> float | None:
+        """Goals of sequences that were reached, per minute."""
+        reached, steps = self.goals_reached, self.steps.sum()
+        return float(60.0 * reached.sum() / (steps * self.time_step)) if len(reached) else None
 
     @property
     def relative_success(self) -> float | None:

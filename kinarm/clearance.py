@@ -240,7 +240,8 @@ def find_reachable(world: "World", goals: Array, configurations: int = 50_000) -
 
 def reach_warning(world: "World") -> str | None:
     """Say in a line if many of a problem's goals seem out of reach."""
-    found = find_reachable(world, world.goals.draw(np.random.default_rng(0), GOALS))
+    goals = world.goals.draw(np.random.default_rng(0), GOALS)
+    found = find_reachable(world, goals[:, :3])
     missed = int((~found).sum())
     if missed <= MANY * GOALS:
         return None

@@ -62,13 +62,13 @@ def scene_of_episode(scene: Scene, arm: Arm, start: Array, goal: Array) -> Scene
     ----------
     scene, arm : Scene and Arm
         The scene, and the arm where it stands.
-    start, goal : ndarray, shape (n_joints,) and (3,)
+    start, goal : ndarray, shape (n_joints,) and (goal_width,)
         Where the episode starts [rad or m], and its goal [m].
     """
     if not scene.random_bodies:
         return scene
     draws = SceneDraws.of(scene)
-    (rows,) = drawn_rows(scene, draws, arm.chain, start[None], goal[None], threads=1)
+    (rows,) = drawn_rows(scene, draws, arm.chain, start[None], goal[None, :3].copy(), threads=1)
     fixed = len(scene.obstacles)
     slots = [body for each in scene.random_bodies for body in each.slots]
     placed = zip(slots, rows[fixed : fixed + len(slots)], strict=True)

@@ -2,13 +2,13 @@
 
 from dataclasses import dataclass
 from functools import partial
-from typing import Literal, NamedTuple
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from kinarm.kernels.compiling import Array
-from kinarm.task import REWARD_TERMS
+from kinarm.task import ReachTask
 
 INTERVALS = 16
 """Parts of a step that is tested throughout."""
@@ -48,6 +48,8 @@ class Rules(NamedTuple):
     boxes : ndarray, shape (n_placed, 2, 3)
         Middle and half-size of a box around each body of the scene, before its
         size.
+    goal : GoalRules
+        What is to be reached, and how; see ``kinarm.kernels.goals``.
     """
 
     step_limit: Array
@@ -61,6 +63,7 @@ class Rules(NamedTuple):
     shown: NDArray[np.uint32]
     width: int
     boxes: Array
+    goal: Any
 
     @property
     def parts(self) -> int:
@@ -99,6 +102,33 @@ class Control(NamedTuple):
     actions: Array = np.zeros((0, 0, 0))
 
 
+class Pursuit(NamedTuple):
+    """What episodes have whose goals are not standing points, reached once touched.
+
+    For others, all arrays have the length 0.
+
+    Attributes
+    ----------
+    reached : ndarray, shape (n, goal_width)
+        What the tool has reached, as goals are.
+    turn : ndarray, shape (n,)
+        Error of the goal's rest [rad, or rad or m].
+    held, goals_reached : ndarray of int, shape (n,)
+        Steps in a row within the tolerances, and goals reached.
+    goals : ndarray, shape (n, n_goals, goal_width) or (0, n_goals, goal_width)
+        Goals in turn, before they move; of length 0 if the goal stays.
+    path : ndarray, shape (n, horizon + 1, goal_width) or (0, 0, goal_width)
+        Goals after each step, if paths are kept and goals change.
+    """
+
+    reached: Array
+    turn: Array
+    held: NDArray[np.int64]
+    goals_reached: NDArray[np.int64]
+    goals: Array
+    path: Array
+
+
 class Episodes(NamedTuple):
     """State of n episodes, which kernels change in place.
 
@@ -127,8 +157,10 @@ class Episodes(NamedTuple):
         ``kinarm.kernels.plant``.
     sensed : ndarray, shape (n, n_joints) or (0, n_joints)
         Joint positions as such a plant measures them [rad or m].
-    goal, distance : ndarray, shape (n, 3) and (n,)
-        Goal position, and the tool's distance from it [m].
+    goal, distance : ndarray, shape (n, goal_width) and (n,)
+        Goal, its position first, and the tool's distance from that [m].
+    pursuit : Pursuit
+        What goals beyond standing points have besides.
     observation : ndarray, shape (n, n_observations)
         Observation of the current state.
     terms, total : ndarray, shape (n, n_terms) and (n,)
@@ -155,6 +187,7 @@ class Episodes(NamedTuple):
     drive: Array
     sensed: Array
     goal: Array
+    pursuit: Any
     observation: Array
     distance: Array
     terms: Array
@@ -162,6 +195,18 @@ class Episodes(NamedTuple):
     moments: Array
     shift: Array
     path: Array
+
+    @property
+    def first_goals(self) -> Array:
+        """Goals with which episodes began, shape (n, goal_width)."""
+        goals: Array = self.pursuit.goals
+        return goals[:, 0] if len(goals) else self.goal
+
+    @property
+    def turn(self) -> Array:
+        """Errors of the goals' rests, shape (n,) [rad, or rad or m]; empty if they have none."""
+        turn: Array = self.pursuit.turn
+        return turn if self.goal.shape[1] > 3 else turn[:0]
 
     def scenes_at(self, rows: NDArray[np.int64]) -> Array:
         """Scenes of some episodes when they began; empty if all have the same."""
@@ -178,25 +223,30 @@ class StepResult(NamedTuple):
 
     Attributes
     ----------
-    numbers : ndarray, shape (2 + n_terms, n)
-        Rewards, distances to the goal [m], and weighted terms, as in
-        `kinarm.REWARD_TERMS`. Rewards are zero for episodes that were over.
+    numbers : ndarray, shape (2 + n_told + n_terms, n)
+        Rewards, distances to the goal [m], what goals have beside it
+        (`kinarm.goals.GoalSpecification.told`), and weighted terms, as in
+        `kinarm.ReachTask.reward_terms`. Rewards are zero for episodes that were
+        over.
     flags : ndarray of bool, shape (3, n)
         Truncation, success and refusal by contact; false for episodes that go
         on or were over.
     contact : ndarray of int, shape (n,)
         Number, from 1, of the pair that refused the step; 0 if none or unknown.
+    task : ReachTask
+        The task.
     """
 
     numbers: Array
     flags: NDArray[np.bool_]
     contact: NDArray[np.int64]
+    task: ReachTask
 
     @classmethod
-    def empty(cls, n: int) -> "StepResult":
-        """Empty tables."""
-        rows = 2 + len(REWARD_TERMS)
-        return cls(np.empty((rows, n)), np.empty((3, n), bool), np.empty(n, np.int64))
+    def empty(cls, n: int, task: ReachTask) -> "StepResult":
+        """Empty tables for a task."""
+        rows = 2 + len(task.goal.told) + len(task.reward.terms)
+        return cls(np.empty((rows, n)), np.empty((3, n), bool), np.empty(n, np.int64), task)
 
     @property
     def reward(self) -> Array:
@@ -211,7 +261,12 @@ class StepResult(NamedTuple):
     @property
     def terms(self) -> Array:
         """The weighted terms, shape (n, n_terms)."""
-        return self.numbers[2:].T
+        return self.numbers[-len(self.task.reward.terms) :].T
+
+    @property
+    def told(self) -> dict[str, Array]:
+        """What goals have beside a distance, ``turn`` and ``goals_reached``, shape (n,) each."""
+        return dict(zip(self.task.goal.told, self.numbers[2:], strict=False))
 
     @property
     def truncated(self) -> NDArray[np.bool_]:
@@ -240,8 +295,8 @@ class Rollouts:
 
     Attributes
     ----------
-    starts, goals : ndarray, shape (n, n_joints) and (n, 3)
-        Start configurations [rad or m] and goal positions [m].
+    starts, goals : ndarray, shape (n, n_joints) and (n, goal_width)
+        Start configurations [rad or m] and first goals [m].
     success, collision : ndarray of bool, shape (n,)
         How episodes ended; neither means truncation at the horizon.
     steps, distance, returns : ndarray, shape (n,)
@@ -253,6 +308,10 @@ class Rollouts:
         Sums of the observations acted upon, less the shift, and their squares.
     paths : ndarray, shape (n, horizon + 1, n_joints), or empty
         Configurations visited, NaN after the end.
+    turn, goals_reached : ndarray, shape (n,), or empty
+        Final error of the goal's rest [rad, or rad or m], and goals reached.
+    goal_paths : ndarray, shape (n, horizon + 1, goal_width), or empty
+        Goals after each step, for those that move or follow each other.
     """
 
     starts: Array
@@ -266,6 +325,9 @@ class Rollouts:
     targets: Array
     moments: Array
     paths: Array
+    turn: Array
+    goals_reached: NDArray[np.int64]
+    goal_paths: Array
 
     @classmethod
     def from_episodes(cls, starts: Array, episodes: Episodes, *, copy: bool = False) -> "Rollouts":
@@ -282,7 +344,7 @@ class Rollouts:
         kept = partial(np.array, copy=copy or None)
         rollouts = cls(
             starts=starts,
-            goals=kept(episodes.goal),
+            goals=kept(episodes.first_goals),
             success=episodes.status == SUCCESS,
             collision=episodes.status == COLLISION,
             steps=kept(episodes.steps),
@@ -292,6 +354,9 @@ class Rollouts:
             targets=kept(episodes.target),
             moments=kept(episodes.moments),
             paths=kept(episodes.path),
+            turn=kept(episodes.turn),
+            goals_reached=kept(episodes.pursuit.goals_reached),
+            goal_paths=kept(episodes.pursuit.path),
         )
         for array in vars(rollouts).values():
             array.flags.writeable = False

@@ -30,8 +30,8 @@ class FailedScenarios(NamedTuple):
     ----------
     starts : ndarray, shape (n, n_joints)
         Configurations [rad or m].
-    goals : ndarray, shape (n, 3)
-        Goal positions [m].
+    goals : ndarray, shape (n, goal_width)
+        Goals [m].
     """
 
     starts: NDArray[np.float64]
@@ -44,9 +44,9 @@ class FailedScenarios(NamedTuple):
             raise InvalidInputError(f"failed scenarios have the shapes {shapes[0]}, {shapes[1]}")
 
     @classmethod
-    def none(cls, n_joints: int) -> "FailedScenarios":
+    def none(cls, n_joints: int, goal_width: int = 3) -> "FailedScenarios":
         """Before the first failure."""
-        return cls(np.empty((0, n_joints)), np.empty((0, 3)))
+        return cls(np.empty((0, n_joints)), np.empty((0, goal_width)))
 
     def followed_by(
         self, starts: NDArray[np.float64], goals: NDArray[np.float64], size: int

@@ -260,7 +260,7 @@ class InverseKinematics(Kinematics):
             )
         along = np.broadcast_to(_units("directions", along), positions.shape)
         if tool_axis is None:
-            axis = _approach(self.arm)
+            axis = approach_axis(self.arm)
         else:
             given = _units("tool_axis", finite_array("tool_axis", tool_axis, (3,))[None])
             axis = (self.tool.placement[:3, :3] * given).sum(axis=1)
@@ -294,7 +294,7 @@ def _units(name: str, vectors: Array) -> Array:
     return units
 
 
-def _approach(arm: Arm) -> Array:
+def approach_axis(arm: Arm) -> Array:
     """Axis of the last joint in its own frame, away from the joint before."""
     axis: Array = arm.chain.axis[-1]
     before = arm.model.jointPlacements[arm.n_joints].actInv(np.zeros(3))

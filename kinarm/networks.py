@@ -55,11 +55,20 @@ class Layer(NamedTuple):
 
 
 class Mirror(NamedTuple):
-    """Signs of observations and actions in the reflection y -> -y, and where the goal's y is."""
+    """Signs in the reflection y -> -y, and where the goal's y is.
+
+    Attributes
+    ----------
+    observations, actions, goals : ndarray
+        Signs of their entries.
+    side : int
+        Entry of the observation that is positive for goals on the left.
+    """
 
     observations: Array
     actions: Array
     side: int = 1
+    goals: Array = np.array([1.0, -1.0, 1.0])
 
     def on_the_left(self, observations: Array) -> NDArray[np.bool_]:
         """Which observations, shape (n, n_observations), have a goal on the left."""
@@ -71,14 +80,14 @@ class Mirror(NamedTuple):
         return np.where(left[:, None], observations * self.observations, observations)
 
     def scenarios_from_the_right(self, starts: Array, goals: Array) -> tuple[Array, Array]:
-        """Reflect starts, shape (n, n_joints), and goals, shape (n, 3), on the left.
+        """Reflect starts, shape (n, n_joints), and goals, shape (n, goal_width), on the left.
 
         Joints that are not actuated stay.
         """
         left = goals[:, 1] > 0
         starts, goals = starts.copy(), goals.copy()
         starts[left, : len(self.actions)] *= self.actions
-        goals[left, 1] *= -1.0
+        goals[left] *= self.goals
         return starts, goals
 
 
@@ -166,7 +175,9 @@ class Networks:
     def form(self) -> tuple[object, ...]:
         """All but the weights, to compare."""
         signs = (
-            () if self.mirror is None else (tuple(np.ravel(part).tolist()) for part in self.mirror)
+            ()
+            if self.mirror is None
+            else (tuple(np.ravel(part).tolist()) for part in self.mirror[:3])
         )
         return self.widths, self.activations, tuple(signs)
 

@@ -4,7 +4,7 @@ A new part is a function that writes it and an entry of `OBSERVATION`; all else 
 chooses some (`kinarm.Observation`). Policies of another layout are refused.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -12,9 +12,11 @@ import numpy as np
 from kinarm.errors import LARGEST
 from kinarm.kernels.compiling import Array, inlined
 from kinarm.kernels.elementary import sine_cosine
+from kinarm.kernels.goals import nearer_sign, write_reached
 from kinarm.kernels.plant import COMMAND
 from kinarm.kernels.session import Session
 from kinarm.kernels.surroundings import NEAR, Seen, write_obstacles, write_proximity
+from kinarm.observation_choice import REST_PARTS
 from kinarm.scene import Scene
 
 if TYPE_CHECKING:
@@ -164,6 +166,26 @@ def _write_time(session: Session, seen: Seen, start: int, count: int) -> None:
     session.block.observation[0, start] = (horizon - session.block.steps[0]) / horizon
 
 
+@inlined
+def _write_rest(session: Session, seen: Seen, start: int, count: int) -> None:
+    """What a goal has beside its position."""
+    for i in range(session.block.goal.shape[1] - 3):
+        session.block.observation[0, start + i] = seen.goal[0, 3 + i]
+
+
+@inlined
+def _write_rest_error(session: Session, seen: Seen, start: int, count: int) -> None:
+    """The same less that of the tool."""
+    goal, block = session.rules.goal, session.block
+    if block.turn.shape[0] > 0:
+        reached = block.seen_reached
+        write_reached(goal, seen.tool, seen.frames, seen.joints, reached, 0)
+        sign = nearer_sign(goal.kind, reached, 0, seen.goal, 0)
+        for i in range(3, block.goal.shape[1]):
+            missing = seen.goal[0, i] - sign * reached[0, i]
+            block.observation[0, start + i - 3] = missing
+
+
 def _slides(arm: "Arm", _: Scene) -> str:
     sliding = [arm.joint_names[k] for k in np.flatnonzero(arm.chain.prismatic)]
     return f"joint {sliding[0]} slides; joint_positions takes it" if sliding else ""
@@ -183,6 +205,30 @@ POLAR = (1, -1, 1)
 
 UNIT = 1 + 1e-6
 """Largest entry of a unit vector, to within rounding."""
+
+
+def _rest_parts(
+    kind: str, meaning: str, signs: tuple[int, ...], of: str = ONCE, unit: str = "1"
+) -> Iterator[Part]:
+    """The rest of a kind of goals, and its error."""
+    for error, name in enumerate(REST_PARTS[kind]):
+
+        def bounds(ranges: Ranges, error: int = error) -> tuple[Array | float, Array | float]:
+            lower, upper = (ranges.lower, ranges.upper) if of == JOINTS else (-UNIT, UNIT)
+            return (lower - upper, upper - lower) if error else (lower, upper)
+
+        less = " of the goal less that of the tool (the nearer of two quaternions)"
+        yield Part(
+            name=name,
+            meaning=meaning + (less if error else " of the goal"),
+            unit=unit,
+            signs=signs,
+            bounds=bounds,
+            write=_write_rest_error if error else _write_rest,
+            of=of,
+            of_goal=True,
+        )
+
 
 OBSERVATION = (
     Part(
@@ -304,6 +350,9 @@ OBSERVATION = (
         of=SLOTS,
         lacks=_has_no_obstacles,
     ),
+    *_rest_parts("direction", "direction x, y, z", POLAR),
+    *_rest_parts("pose", "quaternion w, x, y, z", (1, -1, 1, -1)),
+    *_rest_parts("configuration", "position of each joint", (0,), of=JOINTS, unit="rad or m"),
 )
 """The parts in order; those per joint go through all joints in turn."""
 

@@ -10,6 +10,15 @@ from kinarm.errors import ProblemError, UnknownNameError
 PAPER_PARTS = ("goal", "goal_minus_tool", "orientation", "position")
 """The paper's observation (section 3.2)."""
 
+REST_PARTS = {
+    "direction": ("goal_direction", "direction_error"),
+    "pose": ("goal_rotation", "rotation_error"),
+    "configuration": ("goal_joints", "joints_error"),
+}
+"""Parts of the rests of goals, and of their errors, by the kind of the goals."""
+
+GOAL_RESTS, REST_ERRORS = zip(*REST_PARTS.values(), strict=True)
+
 LONGEST_HISTORY, MOST_SLOTS = 32, 32
 
 
@@ -20,7 +29,8 @@ class Observation(Checked):
     Parameters
     ----------
     parts : tuple of str, optional
-        Names of the parts in their order; by default those of the paper.
+        Names of the parts in their order; by default those of the paper, and of
+        goals with a direction, a rotation or joints these and their error.
     obstacle_slots : int
         Bodies that the part ``obstacles`` shows, the nearest first, from 1 to
         32.
@@ -59,7 +69,10 @@ class Observation(Checked):
                 raise UnknownNameError("field of an observation", name, init_fields(Observation))
         return replace(self, **change)
 
-    @property
-    def names(self) -> tuple[str, ...]:
-        """Names of the parts."""
-        return PAPER_PARTS if self.parts is None else self.parts
+    def names(self, kind: str) -> tuple[str, ...]:
+        """Names of the parts for a kind of goals."""
+        given = (*PAPER_PARTS, *REST_PARTS.get(kind, ())) if self.parts is None else self.parts
+        for name in given:
+            if name in (*GOAL_RESTS, *REST_ERRORS) and name not in REST_PARTS.get(kind, ()):
+                raise ProblemError(f"the observation cannot have {name!r}: a goal is a {kind}")
+        return given

@@ -10,6 +10,7 @@ from kinarm.arm import Arm
 from kinarm.errors import InvalidInputError, ProblemError
 from kinarm.kernels.compiling import Array
 from kinarm.observation import ACTUATED, JOINTS, OBSERVATION, ONCE, SLOTS, VERSION, Part, Ranges
+from kinarm.observation_choice import REST_PARTS
 from kinarm.problem import ReachProblem
 
 
@@ -43,7 +44,7 @@ class ObservationLayout(NamedTuple):
     def sized(cls, problem: ReachProblem, n_joints: int, n_actuated: int) -> "ObservationLayout":
         """The layout for an arm with so many joints."""
         known, chosen = {part.name: part for part in OBSERVATION}, problem.observation
-        parts = tuple(known[name] for name in chosen.names)
+        parts = tuple(known[name] for name in chosen.names(problem.task.goal.kind))
         counts = {ONCE: 1, JOINTS: n_joints, ACTUATED: n_actuated, SLOTS: chosen.obstacle_slots}
         return cls(parts, counts, chosen.history)
 
@@ -83,15 +84,19 @@ class ObservationLayout(NamedTuple):
         return None if goal is None else goal.start + 1
 
     @property
-    def goal_places(self) -> tuple[slice, slice]:
-        """Places of the goal, and of goal minus tool; InvalidInputError if one is not shown."""
+    def goal_entries(self) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+        """Entries of the goal, and of goal less tool; InvalidInputError if one is not shown."""
+        places, pairs = self.places, [("goal", "goal_minus_tool")]
+        pairs += [pair for pair in REST_PARTS.values() if set(pair) & places.keys()]
         try:
-            return self.places["goal"], self.places["goal_minus_tool"]
+            slices = [[places[name] for name in names] for names in zip(*pairs, strict=True)]
         except KeyError as error:
             raise InvalidInputError(
                 f"goals as a dictionary need the part {error} of the observation, which has "
                 f"{', '.join(self.places)}"
             ) from error
+        goal, offset = (np.r_[tuple(part)] for part in slices)
+        return goal, offset
 
     @property
     def sees_bodies(self) -> bool:

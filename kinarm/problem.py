@@ -29,7 +29,7 @@ from kinarm.observation_choice import PAPER_PARTS, Observation
 from kinarm.plant import Plant
 from kinarm.problem_files import PAPER_TASKS, find_scene, find_task, problem_names, read_problem
 from kinarm.scene import Scene
-from kinarm.task import ReachTask, RewardWeights, Stepping
+from kinarm.task import ReachTask, Stepping
 
 if TYPE_CHECKING:
     from kinarm.arm import Arm
@@ -116,10 +116,11 @@ class ReachProblem(Checked):
             ``task`` (by name, of a file, of another problem, or themselves),
             ``stepping``; ``plant`` (by name, of a file, or itself);
             ``observation`` (itself, a list of parts, or a mapping of what
-            changes); ``reward`` (weights, or a mapping of those that change);
-            or any field of task, stepping or plant, such as ``tolerance``. None
-            changes nothing. With another scene, by name or file, that lacks a
-            goal region of the task, all its regions are to be reached.
+            changes); ``reward`` and ``goal`` (themselves, or a mapping of what
+            changes); or any field of task, stepping or plant, such as
+            ``tolerance``. None changes nothing. With another scene, by name or
+            file, that lacks a goal region of the task, all its regions are to be
+            reached.
         """
         given = {name: value for name, value in overrides.items() if value is not None}
         if not given:
@@ -137,10 +138,11 @@ class ReachProblem(Checked):
             regions = {region.name for region in changes["scene"].goal_regions}
             if not regions.issuperset(task.goal_regions):
                 task = changes["task"] = replace(task, goal_regions=(), goal_weights=())
-        if isinstance(given.get("reward"), Mapping):
-            weights = dict(given["reward"])
-            _check_names("reward term", weights, RewardWeights)
-            given["reward"] = replace(task.reward, **weights)
+        for name, what in (("reward", "reward term"), ("goal", "setting of goals")):
+            if isinstance(given.get(name), Mapping):
+                of_part, own = dict(given[name]), getattr(task, name)
+                _check_names(what, of_part, type(own))
+                given[name] = replace(own, **of_part)
         for part, whole in (("task", task), ("stepping", self.stepping), ("plant", self.plant)):
             whole = changes.get(part, whole)
             if own := _taken(given, type(whole)):

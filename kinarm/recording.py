@@ -25,7 +25,7 @@ from kinarm.world import World
 
 KIND, FORMAT_VERSION = "recording", 2
 OUTCOMES = get_args(Outcome)
-ARRAYS = ("states", "distances", "goal", "refused", "contact_point")
+ARRAYS = ("states", "distances", "goal", "refused", "contact_point", "goals")
 """Array fields of a `Recording`."""
 
 
@@ -43,8 +43,8 @@ class Recording:
         Configurations, from the start to the end [rad or m].
     distances : ndarray, shape (steps + 1,)
         Distance from the tool to the goal at each of them [m].
-    goal : ndarray, shape (3,)
-        Goal position [m].
+    goal : ndarray, shape (goal_width,)
+        First goal [m].
     outcome : str
         ``"success"``, ``"collision"`` or ``"truncated"``.
     contact, contact_point : tuple of str and ndarray, shape (3,), optional
@@ -52,6 +52,8 @@ class Recording:
         was refused.
     refused : ndarray, shape (n_joints,), optional
         Configuration of the refused move at which they touch first [rad or m].
+    goals : ndarray, shape (steps + 1, goal_width), optional
+        Goals at each configuration, if they move or follow each other.
     steps_lower_bound : int, optional
         Proven: no motion reaches the goal in fewer steps.
     provenance : dict
@@ -74,6 +76,7 @@ class Recording:
     contact: tuple[str, str] | None = None
     contact_point: NDArray[np.float64] | None = None
     refused: NDArray[np.float64] | None = None
+    goals: NDArray[np.float64] | None = None
     steps_lower_bound: int | None = None
     provenance: Mapping[str, Any] = field(default_factory=dict)
 
@@ -87,7 +90,9 @@ class Recording:
             raise InvalidInputError(
                 f"states must be 1 to {horizon + 1} for a horizon of {horizon}, got {len(states)}"
             )
-        shapes = states.shape, states.shape[:1], (3,), states.shape[1:], (3,)
+        width = self.problem.task.goal.width(states.shape[1])
+        steps, joints = states.shape[:1], states.shape[1:]
+        shapes = states.shape, steps, (width,), joints, (3,), (*steps, width)
         for name, shape in zip(ARRAYS, shapes, strict=True):
             value = getattr(self, name)
             if value is not None:
@@ -209,7 +214,10 @@ def record_rollouts(
         if number not in range(len(rollouts)):
             raise InvalidInputError(f"no trial {number}: there are 0 to {len(rollouts) - 1}")
         states = rollouts.paths[number, : rollouts.steps[number] + 1]
-        goal = rollouts.goals[number]
+        goal, goals = rollouts.goals[number], None
+        if len(rollouts.goal_paths):
+            goals = rollouts.goal_paths[number, : len(states)]
+        aims = np.tile(goal, (len(states), 1)) if goals is None else goals
         touch = None
         if rollouts.collision[number]:
             there = world.in_scene(rollouts.starts[number], goal)
@@ -221,8 +229,9 @@ def record_rollouts(
                 problem=problem,
                 trial=int(number),
                 states=states,
-                distances=world.distances(states, np.tile(goal, (len(states), 1))),
+                distances=world.distances(states, aims),
                 goal=goal,
+                goals=goals,
                 outcome=outcomes[number],
                 contact=touch.pair if touch else None,
                 contact_point=touch.point if touch else None,
@@ -253,8 +262,8 @@ def record_path(
         Arm, scene and time step; a short horizon is extended.
     path : array_like, shape (n, n_joints)
         One or more configurations within the limits [rad or m].
-    goal : array_like, shape (3,), optional
-        Goal position; the tool point at the path's end by default [m].
+    goal : array_like, shape (goal_width,), optional
+        Goal; what the tool reaches at the path's end by default [m].
     name : str
         What the recording calls its policy.
 
@@ -268,7 +277,8 @@ def record_path(
     if len(points) == 0:
         raise InvalidInputError("path holds no configuration")
     points = within_limits("path", points, world.arm.chain, world.arm.joint_names)
-    aim = world.poses(points[-1])[:3, 3] if goal is None else finite_array("goal", goal, (3,))
+    width = (world.goal_width,)
+    aim = world.reached(points[-1:])[0] if goal is None else finite_array("goal", goal, width)
     world = world.in_scene(points[0], aim)
     if (pair := world.contact_pair(points[0])) is not None:
         raise StartInContactError(0, pair)
@@ -278,8 +288,10 @@ def record_path(
         if (contact := world.contact(*motion, step=step)) is not None:
             states = np.concatenate([states[: step + 1], states[step : step + 1]])
             break
-    distances = world.distances(states, np.tile(aim, (len(states), 1)))
-    reached = bool(distances[-1] <= world.problem.task.tolerance)
+    aims, task = np.tile(aim, (len(states), 1)), world.problem.task
+    distances, turns = world.distances(states, aims), world.turns(states[-1:], aims[-1:])
+    turned = bool((turns <= task.goal.rotation_tolerance).all())
+    reached = turned and bool(distances[-1] <= task.tolerance)
     horizon = max(world.problem.task.horizon, len(states) - 1)
     return Recording(
         policy=name,

@@ -15,9 +15,12 @@ from numpy.typing import ArrayLike
 from kinarm.arm import Arm
 from kinarm.contact_pairs import make_verdicts_reliable, start_anew
 from kinarm.errors import LARGEST
+from kinarm.inverse_kinematics import approach_axis
 from kinarm.kernels.compiling import Array
 from kinarm.observation import SLOTS
+from kinarm.observation_choice import GOAL_RESTS, REST_ERRORS
 from kinarm.reference_plant import ReferencePlant
+from kinarm.scenarios import draw_followers
 from kinarm.simulator import Simulator
 from kinarm.world import World
 
@@ -36,6 +39,8 @@ class ReferenceEpisode(NamedTuple):
     distance, contact
         The tool's final distance from the goal [m], and the first pair in
         contact, if any.
+    turn, goals_reached : float and int
+        Final error of the goal's rest [rad, or rad or m], and goals reached.
     """
 
     path: Array
@@ -45,6 +50,8 @@ class ReferenceEpisode(NamedTuple):
     collision: bool
     distance: float
     contact: tuple[str, str] | None
+    turn: float
+    goals_reached: int
 
 
 class Moment(NamedTuple):
@@ -93,17 +100,23 @@ class ReferenceSimulator:
         policy : callable
             Maps an observation, shape (n_observations,), to an action, shape
             (n_actions,).
-        start, goal : ndarray, shape (n_joints,) and (3,)
-            Start configuration [rad or m] and goal position [m].
+        start, goal : ndarray, shape (n_joints,) and (goal_width,)
+            Start configuration [rad or m] and first goal.
         """
         self._begin(self._world.in_scene(start, goal))
         begun = self.contact_model.shapes.placed[list(self._problem.scene.moving), 13:]
         positions = begun + self._problem.body_offsets(np.arange(self.task.horizon + 1))
-        q, reward = np.array(start), self.task.reward
-        joints = ReferencePlant(self._world, q, goal)
-        distance, seen = self.observe(q, goal)[1], joints.seen(q, 0)
-        moment = Moment(q, joints.commanded(q), seen[0])
-        observation = self.observe(*seen, moment)[0]
+        q, reward, spec = np.array(start), self.task.reward, self.task.goal
+        goals = [goal]
+        if spec.count(self.task.horizon):
+            goals = list(draw_followers(self._world, start[None], goal[None])[0])
+        held, reached, limit = 0, 0, np.inf
+        if spec.speed is not None:
+            limit = spec.speed * self._problem.stepping.time_step
+        joints, aim = ReferencePlant(self._world, q, goal), self._goal_at(goals, 0, 0)
+        _, distance, turn, tool = self.observe(q, aim)
+        seen = joints.seen(q, aim, 0)
+        observation = self.observe(*seen, Moment(q, joints.commanded(q), seen[0]))[0]
         path, observations = [q], [observation]
         rewards: list[float] = []
         success, contact = False, None
@@ -111,22 +124,32 @@ class ReferenceSimulator:
             action = np.clip(np.asarray(policy(observation), dtype=float), -1.0, 1.0)
             target = joints.moved(q, action)
             contact = self.first_contact(q, target, *positions[len(rewards) :][:2])
-            before = distance
+            before, turned, arrived = distance, turn, False
             if contact is None:
-                q = target
-                distance = self.observe(q, goal)[1]
-                before_it, now = seen[0], len(rewards) + 1
-                seen, commanded = joints.seen(q, now), joints.commanded(q)
-                moment = Moment(q, commanded, before_it, action, now, observation)
-                observation = self.observe(*seen, moment)[0]
-                success = distance <= self.task.tolerance
+                q, aim = target, self._goal_at(goals, len(rewards) + 1, reached)
+                last, (_, distance, turn, tool) = tool, self.observe(q, aim)
+                within = distance <= self.task.tolerance and turn <= spec.rotation_tolerance
+                held = held + 1 if within and np.linalg.norm(tool - last) <= limit else 0
+                arrived = held >= spec.hold
             rewards.append(
                 reward.progress * (before - distance)
+                + reward.progress * reward.rotation * (turned - turn)
                 + reward.closer * np.sign(before - distance)
                 + reward.step
                 + reward.collision * (contact is not None)
-                + reward.success * success
+                + reward.success * arrived
             )
+            if arrived:
+                held, reached = 0, reached + 1
+                success = reached == spec.sequence
+                if not success:
+                    aim = self._goal_at(goals, len(rewards), reached)
+                    _, distance, turn, tool = self.observe(q, aim)
+            if contact is None:
+                before_it, now = seen[0], len(rewards)
+                seen, commanded = joints.seen(q, aim, now), joints.commanded(q)
+                moment = Moment(q, commanded, before_it, action, now, observation)
+                observation = self.observe(*seen, moment)[0]
             path.append(q)
             observations.append(observation)
         return ReferenceEpisode(
@@ -137,7 +160,26 @@ class ReferenceSimulator:
             collision=contact is not None,
             distance=distance,
             contact=contact,
+            turn=turn,
+            goals_reached=reached,
         )
+
+    def _goal_at(self, goals: list[Array], step: int, reached: int) -> Array:
+        """The goal after so many steps and goals reached, shape (goal_width,)."""
+        spec = self.task.goal
+        if spec.wander is not None:
+            number, passed = divmod(step, spec.wander)
+            start, end = goals[number], goals[number + 1].copy()
+            if spec.kind == "pose" and start[3:] @ end[3:] < 0:
+                start = np.concatenate([start[:3], -start[3:]])
+            goal = start + passed / spec.wander * (end - start)
+            if spec.number:
+                goal[3:] /= np.linalg.norm(goal[3:])
+            return goal
+        goal = goals[min(reached, spec.sequence - 1)].copy()
+        if spec.motion is not None:
+            goal[:3] += spec.motion.offsets(np.array([step * self._problem.stepping.time_step]))[0]
+        return goal
 
     def _begin(self, there: World) -> None:
         """Take the bodies of an episode."""
@@ -145,14 +187,16 @@ class ReferenceSimulator:
         self._geometry = self.contact_model.geometry.clone()
         self._geometry_data = make_verdicts_reliable(self._geometry.createData())
 
-    def observe(self, q: Array, goal: Array, moment: Moment | None = None) -> tuple[Array, float]:
-        """Observation of a configuration and the distance to the goal [m].
+    def observe(
+        self, q: Array, goal: Array, moment: Moment | None = None
+    ) -> tuple[Array, float, float, Array]:
+        """Observation of a configuration, errors of position [m] and rest, and the tool point.
 
         All parts but ``proximity``, whose planes only kernels find, are computed anew.
 
         Parameters
         ----------
-        q, goal : ndarray, shape (n_joints,) and (3,)
+        q, goal : ndarray, shape (n_joints,) and (goal_width,)
             Configuration [rad or m] and goal [m] as they are seen.
         moment : Moment, optional
             What else is seen; by default at the start of an episode there.
@@ -160,12 +204,14 @@ class ReferenceSimulator:
         now = moment or Moment(q, q, q)
         model, data = self.arm.model, self._data
         pin.framesForwardKinematics(model, data, q)
-        tool = data.oMf[model.getFrameId(self.arm.tool_frame, pin.FrameType.BODY)].translation
-        offset = goal - tool
+        pose = data.oMf[model.getFrameId(self.arm.tool_frame, pin.FrameType.BODY)]
+        tool, rest = np.array(pose.translation), goal[3:]
+        offset = goal[:3] - tool
         positions = [data.oMi[i].translation for i in range(1, model.njoints)]
+        error, turn = self._turn(q, pose.rotation, rest)
         limit, layout = self._world.rules.step_limit, self._there.layout
         formulas: dict[str, Callable[[], Any]] = {
-            "goal": lambda: goal,
+            "goal": lambda: goal[:3],
             "goal_minus_tool": lambda: offset,
             "orientation": lambda: self._quaternions(q),
             "position": lambda: positions,
@@ -177,12 +223,14 @@ class ReferenceSimulator:
             "time_left": lambda: 1 - now.step / self.task.horizon,
             "proximity": lambda: self._there.observe([now.joints], [goal], now.step)[0, near],
             "obstacles": lambda: self._nearest(tool, layout.counts[SLOTS]),
+            **dict.fromkeys(GOAL_RESTS, lambda: rest),
+            **dict.fromkeys(REST_ERRORS, lambda: error),
         }
         near = layout.places.get("proximity")
         seen = np.concatenate([np.ravel(formulas[part.name]()) for part in layout.parts])
         earlier = np.tile(seen, layout.history) if now.earlier is None else now.earlier
         observation = np.concatenate([seen, earlier[: layout.size - layout.width]])
-        return observation, float(np.linalg.norm(offset))
+        return observation, float(np.linalg.norm(offset)), turn, tool
 
     def _nearest(self, tool: Array, slots: int) -> Array:
         """Boxes around the bodies that are nearest to the tool point, shape (slots, 12)."""
@@ -200,6 +248,24 @@ class ReferenceSimulator:
             found.append((distance, np.concatenate(row)))
         rows = [row for _, row in sorted(found, key=lambda each: each[0])[:slots]]
         return np.array([*rows, *[np.zeros(12)] * (slots - len(rows))])
+
+    def _turn(self, q: Array, rotation: Array, rest: Array) -> tuple[Array, float]:
+        """Difference of a goal's rest from what is reached, and its size [rad, or rad or m]."""
+        kind = self.task.goal.kind
+        if kind == "configuration":
+            return rest - q, float(np.abs(rest - q).max())
+        if kind == "direction":
+            joint = self._data.oMi[self.arm.n_joints].rotation
+            reached = joint @ approach_axis(self.arm)
+            sine = float(np.linalg.norm(np.cross(reached, rest)))
+            return rest - reached, float(np.arctan2(sine, reached @ rest))
+        if kind == "pose":
+            x, y, z, w = pin.Quaternion(rotation).coeffs()
+            reached = np.array([w, x, y, z])
+            reached *= 1.0 if reached @ rest >= 0 else -1.0
+            wanted = pin.Quaternion(*rest)
+            return rest - reached, float(pin.Quaternion(rotation).angularDistance(wanted))
+        return np.zeros(0), 0.0
 
     def _quaternions(self, q: Array) -> list[Array]:
         """World orientations of joint frames, composed along the chain."""

@@ -16,12 +16,12 @@ class ReferencePlant:
     ----------
     world : World
         World of the problem.
-    start, goal : ndarray, shape (n_joints,) and (3,)
-        Start configuration [rad or m] and goal position [m].
+    start, goal : ndarray, shape (n_joints,) and (goal_width,)
+        Start configuration [rad or m] and first goal.
     """
 
     def __init__(self, world: World, start: Array, goal: Array) -> None:
-        self._arm, self._limit, self._goal = world.arm, world.rules.step_limit, goal
+        self._arm, self._limit = world.arm, world.rules.step_limit
         n = len(self._limit)
         self._commanded = world.rules.commanded == 1
         self._velocity, self._change = np.zeros(n), np.zeros(n)
@@ -77,17 +77,18 @@ class ReferencePlant:
                 self._velocity[axis] = self._change[axis] = 0.0
         return float(np.clip(q, start - limit, start + limit))
 
-    def seen(self, q: Array, step: int) -> tuple[Array, Array]:
+    def seen(self, q: Array, goal: Array, step: int) -> tuple[Array, Array]:
         """Joint positions [rad or m] and goal [m] as they are seen after so many steps."""
-        n, seen = len(self._limit), q.copy()
+        n, seen, aim = len(self._limit), q.copy(), goal.copy()
         if not len(self._numbers):
-            return seen, self._goal
+            return seen, aim
         noise = np.array([self._normal(1 + step * (n + 3) + i) for i in range(n + 3)])
         by_joint, by_goal = self._numbers[GOAL_NOISE - 1 : GOAL_NOISE + 1]
         seen[:n] += self._bias - self._calibration + by_joint * noise[:n]
         if self._commanded:
             seen[:n] = self._commands[-1]
-        return seen, self._goal + self._numbers[OFFSETS + 2 * n :] + by_goal * noise[n:]
+        aim[:3] += self._numbers[OFFSETS + 2 * n :] + by_goal * noise[n:]
+        return seen, aim
 
     def commanded(self, q: Array) -> Array:
         """Joint positions that were last commanded [rad or m]."""

@@ -5,8 +5,11 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from kinarm.episode_scenes import bits_of
 from kinarm.errors import ProblemError, whole_number
+from kinarm.goal_kinematics import SAMPLE
 from kinarm.kernels.compiling import Array
+from kinarm.kernels.goals import errors_between
 from kinarm.world import World
 
 START_ATTEMPTS = 2000
@@ -17,12 +20,12 @@ PREFETCHED = 32
 def draw_scenarios(
     world: World, rng: np.random.Generator, count: int, *, start_spread: float | None = None
 ) -> tuple[Array, Array]:
-    """Draw starts, shape (count, n_joints) [rad or m], and goals, shape (count, 3) [m].
+    """Draw starts, shape (count, n_joints) [rad or m], and goals, shape (count, goal_width).
 
-    Goals are uniform over the task's regions. Each actuated joint starts
-    uniformly within its limits, scaled by the start spread, or the arm starts
+    Goals are uniform over the task's regions, with rests as the task says. Each
+    actuated joint starts uniformly within its limits, scaled by the start spread, or the arm starts
     at one of the task's configurations, without contact and farther from the
-    goal than the tolerance. If the task asks for it, goals without a free
+    goal's position than the tolerance. If the task asks for it, goals without a free
     configuration are drawn again. If none is found in 2000 attempts, that is
     a `kinarm.ProblemError`.
 
@@ -61,8 +64,14 @@ def draw_for_each(
     spread = task.start_spread if start_spread is None else start_spread
     lower = (arm.home + spread * (arm.lower - arm.home))[:n_actions]
     extent = (spread * (arm.upper - arm.lower))[:n_actions]
-    width = 1 + len(world.goals.moving)
-    goals = world.goals.at(_draw(rngs, [count] * len(rngs), width))
+    width, solved = world.goals.n_uniforms, task.reachable_goals or world.goals.solved
+    drawn = _draw(rngs, [count] * len(rngs), width)
+    goals = world.goals.at(drawn)
+    if task.goal.number and not world.reachable_of_sample:
+        raise ProblemError(
+            f"0 of a sample of {SAMPLE} goals can be reached: arm {arm.name!r} with "
+            f"{arm.n_actuated} actuated joints finds no such {task.goal.kind} free of contact"
+        )
     listed = world.starts
     starts = np.tile(arm.home, (len(goals), 1))
     pending = np.arange(len(goals))
@@ -77,22 +86,26 @@ def draw_for_each(
             starts[pending, :n_actions] = lower + uniforms * extent
         proposed = starts[pending]
         tools, touching = world.screened(proposed, world.scenes_of(proposed, aims))
-        x, y, z = (tools - aims).T
+        x, y, z = (tools - aims[:, :3]).T
         rejected = touching | (np.sqrt(x * x + y * y + z * z) <= task.tolerance)
-        if task.reachable_goals:
+        if solved:
             missed = ~rejected
-            missed[missed] = ~have_solutions(world, proposed[missed], aims[missed])
+            tried = pending[missed]
+            scenes = world.scenes_of(proposed[missed], aims[missed])
+            found, goals[tried] = world.solved_goals(aims[missed], drawn[tried, -1], scenes)
+            missed[missed] = ~found
             rows = pending[missed]
             wanted = np.bincount(rows // max(count, 1), minlength=len(rngs)).tolist()
-            goals[rows] = world.goals.at(_draw(rngs, wanted, width))
+            drawn[rows] = _draw(rngs, wanted, width)
+            goals[rows] = world.goals.at(drawn[rows])
             rejected |= missed
         pending = pending[rejected]
         if pending.size == 0:
             shape = len(rngs), count
-            return starts.reshape(*shape, arm.n_joints), goals.reshape(*shape, 3)
+            return starts.reshape(*shape, arm.n_joints), goals.reshape(*shape, world.goal_width)
     pair = world.contact_model.contact_pair(starts[pending[0]])
     reason = f"{pair[0]} touches {pair[1]}" if pair else "the tool already is at the goal"
-    if task.reachable_goals and missed.any():
+    if solved and missed.any():
         reason = "nothing free of contact is found at the goal"
     drawn_from = "from task.starts" if len(listed) else f"with start_spread {spread}"
     raise ProblemError(
@@ -101,25 +114,48 @@ def draw_for_each(
     )
 
 
-SOLUTIONS = (4, 64)
-"""Configurations at a goal that are tried in turn."""
+def draw_followers(world: World, starts: Array, goals: Array) -> Array:
+    """Goals of episodes in turn, shape (n, n_goals, goal_width), of which the first is given.
 
+    The others follow from the bits of starts and first goals. Each is out of the tolerances of the
+    one before.
 
-def have_solutions(world: World, starts: Array, goals: Array) -> NDArray[np.bool_]:
-    """Whether inverse kinematics finds what touches nothing at the goals of scenarios.
-
-    Takes starts, shape (n, n_joints) [rad or m], which decide about scenes, and goals, shape (n, 3)
-    [m].
+    Parameters
+    ----------
+    world, starts, goals
+        The world, starts, shape (n, n_joints) [rad or m], and first goals, shape (n, goal_width).
     """
-    found, scenes = np.zeros(len(goals), dtype=bool), world.scenes_of(starts, goals)
-    for most in SOLUTIONS:
-        rows = np.flatnonzero(~found)
-        solutions = world.inverse_kinematics(goals[rows], most=most)
-        owner = rows[solutions.owner]
-        there = scenes[owner] if len(scenes) else scenes
-        _, touching = world.screened(np.ascontiguousarray(solutions.configurations), there)
-        found[owner[~touching]] = True
-    return found
+    task = world.problem.task
+    drawn = np.repeat(goals[:, None], task.goal.count(task.horizon), axis=1)
+    bits = bits_of(starts, goals).tolist()
+    rngs, scenes = [np.random.default_rng(row) for row in bits], world.scenes_of(starts, goals)
+    pending = np.zeros(drawn.shape[:2], dtype=bool)
+    pending[:, 1:] = True
+    for _ in range(START_ATTEMPTS):
+        owner = pending.nonzero()[0]
+        if not owner.size:
+            return drawn
+        uniforms = _draw(rngs, pending.sum(axis=1).tolist(), world.goals.n_uniforms)
+        found, aims = np.ones(len(owner), dtype=bool), world.goals.at(uniforms)
+        if task.reachable_goals or world.goals.solved:
+            there = scenes[owner] if len(scenes) else scenes
+            found, aims = world.solved_goals(aims, uniforms[:, -1], there)
+        drawn[pending] = aims
+        pending[pending] = ~found
+        pending[:, 1:] |= _close(world, drawn[:, :-1], drawn[:, 1:])
+    raise ProblemError(f"no goals of a sequence found in {START_ATTEMPTS} attempts")
+
+
+def _close(world: World, goals: Array, others: Array) -> NDArray[np.bool_]:
+    """Whether goals are within the tolerances of others, shape (n, k)."""
+    task, shape = world.problem.task, goals.shape[:2]
+    distances, turns = np.empty(shape), np.empty(shape)
+    reached = np.ascontiguousarray(goals).reshape(-1, goals.shape[2])
+    wanted = np.ascontiguousarray(others).reshape(-1, goals.shape[2])
+    filled = distances.reshape(-1), turns.reshape(-1)
+    errors_between(task.goal.number, reached, wanted, *filled)
+    near: NDArray[np.bool_] = distances <= task.tolerance
+    return near & (turns <= task.goal.rotation_tolerance)
 
 
 def _draw(rngs: Sequence[np.random.Generator], counts: Sequence[int], width: int) -> Array:
@@ -144,7 +180,7 @@ class ScenarioQueues:
     def __init__(self, world: World, n_arms: int) -> None:
         self._world, self._rngs = world, [np.random.default_rng() for _ in range(n_arms)]
         self._starts = np.empty((n_arms, 2 * PREFETCHED, world.arm.n_joints))
-        self._goals = np.empty((n_arms, 2 * PREFETCHED, 3))
+        self._goals = np.empty((n_arms, 2 * PREFETCHED, world.goal_width))
         self._taken, self._drawn = np.zeros((2, n_arms), dtype=np.int64)
 
     def seed(self, row: int, rng: np.random.Generator) -> None:

@@ -18,7 +18,7 @@ from kinarm.kernels.session import Session
 from kinarm.networks import CompiledPolicy, Networks, PolicyFunction, network_control, takes_rows
 from kinarm.plant import PlantLike
 from kinarm.problem import ProblemLike, ReachProblem
-from kinarm.scenarios import draw_scenarios
+from kinarm.scenarios import draw_followers, draw_scenarios
 from kinarm.scene import Scene
 from kinarm.task import ReachTask
 from kinarm.world import World
@@ -146,26 +146,35 @@ class Simulator:
         origins: Array | None = None,
         taken: NDArray[np.int64] | int = 0,
         drive: Array | None = None,
+        done: NDArray[np.int64] | None = None,
     ) -> Episodes:
         """Begin a batch of episodes, to be driven by `step`.
 
         Parameters
         ----------
-        starts, goals : array_like, shape (n, n_joints) and (n, 3)
-            Start configurations [rad or m], and goal positions [m].
+        starts, goals : array_like, shape (n, n_joints) and (n, goal_width)
+            Start configurations [rad or m], and (first) goals: positions [m], and
+            their rests.
         record : bool
             Keep the configurations visited.
         origins : ndarray, shape (n, n_joints), optional
             Where episodes that go on at these starts had begun [rad or m]:
-            random bodies stay.
+            random bodies and later goals stay.
         taken : ndarray of int, shape (n,), or int
             Steps that they have taken before.
         drive : ndarray, shape (n, n_rows, n_actions), optional
             States of their plants; by default the arms rest.
+        done : ndarray of int, shape (2, n), optional
+            Goals that they have reached before, and steps in a row that they have
+            kept the present one.
         """
         episodes = self.world.episodes(*self.world.check_scenarios(starts, goals), record=record)
         episodes.steps[:] = taken
+        if done is not None:
+            episodes.pursuit.goals_reached[:] = done[0]
         self._start(np.arange(len(episodes.steps)), self._stepped(episodes), origins, drive)
+        if done is not None:
+            episodes.pursuit.held[:] = done[1]
         return episodes
 
     def step(self, episodes: Episodes, actions: ArrayLike) -> StepResult:
@@ -179,8 +188,8 @@ class Simulator:
             Fractions of the velocity limits, clipped to [-1, 1].
         """
         session = self._step(episodes, actions)
-        result = StepResult.empty(len(episodes.status))
-        results_of_step(session, *result)
+        result = StepResult.empty(len(episodes.status), self.task)
+        results_of_step(session, result.numbers, result.flags, result.contact)
         return result
 
     def rollout(
@@ -289,15 +298,20 @@ class Simulator:
         """Start some episodes in their scenes; Coal decides about doubtful starts."""
         episodes, contacts = session.episodes, self.world.contact_model
         begun = episodes.q[rows] if origins is None else origins
+        goals, followers = episodes.goal[rows], episodes.pursuit.goals
         if self.world.plants.width:
-            plants = self.world.plants.of(begun, episodes.goal[rows], self.threads)
+            plants = self.world.plants.of(begun, goals, self.threads)
             rests = drive is None or not len(drive)
             episodes.plant[rows] = plants
             episodes.drive[rows] = (
                 self.world.plants.at_rest(plants, episodes.q[rows]) if rests else drive
             )
         if self.world.has_random_bodies:
-            episodes.scenes[rows] = self.world.scenes_of(begun, episodes.goal[rows])
+            episodes.scenes[rows] = self.world.scenes_of(begun, goals)
+        if len(followers):
+            followers[rows] = draw_followers(self.world, begun, goals)
+        if origins is None and not self.task.goal.plain:
+            episodes.pursuit.goals_reached[rows] = 0
         if not run_together(begin, len(rows), self.threads, session.of_thread, rows):
             return
         paused = rows[episodes.status[rows] == PAUSED]

@@ -4,13 +4,14 @@ Numbers out of range are an `InvalidInputError`, what does not match is a `Probl
 """
 
 from dataclasses import dataclass, field, fields
-from typing import NamedTuple
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 from kinarm._fields import OPTIONAL, Checked
 from kinarm.errors import FROM_ZERO, POSITIVE, SHARE, ProblemError
+from kinarm.goals import Goals, GoalSpecification
 from kinarm.scene import Scene
 
 LONGEST_HORIZON = 1_000_000
@@ -36,6 +37,9 @@ class RewardWeights(Checked):
         negative.
     success : float
         Added once when the tool comes within the tolerance.
+    rotation : float
+        Metres that a radian of the goal's direction or rotation, or of a joint,
+        counts in a further term, rewarded as progress is [m/rad].
     allow_perverse : bool
         Accept weights that reward contact or punish success.
     """
@@ -45,6 +49,7 @@ class RewardWeights(Checked):
     step: float = 0.0
     collision: float = -1.0
     success: float = 0.0
+    rotation: float = field(default=0.0, metadata=OPTIONAL)
     allow_perverse: bool = False
 
     def __post_init__(self) -> None:
@@ -61,47 +66,21 @@ class RewardWeights(Checked):
 
     @property
     def vector(self) -> NDArray[np.float64]:
-        """The weights in the order of `REWARD_TERMS`."""
-        return np.array([getattr(self, name) for name in REWARD_TERMS], dtype=np.float64)
+        """The weights in the order of `terms`."""
+        weights = [getattr(self, name) for name in REWARD_TERMS]
+        turned = [self.progress * self.rotation] if self.rotation else []
+        return np.array(weights + turned, dtype=np.float64)
+
+    @cached_property
+    def terms(self) -> tuple[str, ...]:
+        """Names of the terms: `REWARD_TERMS`, and ``rotation`` if it counts."""
+        return (*REWARD_TERMS, "rotation") if self.rotation else REWARD_TERMS
 
 
-REWARD_TERMS = tuple(item.name for item in fields(RewardWeights) if item.name != "allow_perverse")
-"""Names of the reward terms, in the order of `kinarm.kernels.reward`."""
-
-
-class Goals(NamedTuple):
-    """Where goals lie.
-
-    Attributes
-    ----------
-    lower : ndarray, shape (n_regions, 3)
-        Lower corners of the regions [m].
-    extent : ndarray, shape (n_regions, n_moving)
-        Their edges along `moving` [m].
-    moving : ndarray of int, shape (n_moving,)
-        Axes along which any region has an edge.
-    ends : ndarray, shape (n_regions - 1,)
-        Ends of the regions' shares in [0, 1).
-    """
-
-    lower: NDArray[np.float64]
-    extent: NDArray[np.float64]
-    moving: NDArray[np.int64]
-    ends: NDArray[np.float64]
-
-    def draw(self, rng: np.random.Generator, count: int) -> NDArray[np.float64]:
-        """Draw goals, shape (count, 3) [m], uniform over each region."""
-        return self.at(rng.random((count, 1 + len(self.moving))))
-
-    def at(self, uniforms: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Goals, shape (n, 3) [m], of numbers in [0, 1), shape (n, 1 + n_moving).
-
-        A row's first number chooses the region, and the others the place in it.
-        """
-        chosen = self.ends.searchsorted(uniforms[:, 0], side="right")
-        goals: NDArray[np.float64] = self.lower[chosen]
-        goals[:, self.moving] += uniforms[:, 1:] * self.extent[chosen]
-        return goals
+REWARD_TERMS = tuple(
+    item.name for item in fields(RewardWeights) if item.name not in ("rotation", "allow_perverse")
+)
+"""Names of the reward terms of all goals, in the order of `kinarm.kernels.reward`."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -128,6 +107,9 @@ class ReachTask(Checked):
         the goal that touches nothing, with bodies where they are at first.
     reward : RewardWeights
         What is rewarded.
+    goal : GoalSpecification
+        What is to be reached: a position, direction, pose or configuration; how
+        it is held; and whether goals move or follow each other.
     """
 
     goal_regions: tuple[str, ...] = ()
@@ -138,6 +120,7 @@ class ReachTask(Checked):
     starts: tuple[tuple[float, ...], ...] = field(default=(), metadata=OPTIONAL)
     reachable_goals: bool = field(default=False, metadata=OPTIONAL)
     reward: RewardWeights = field(default_factory=RewardWeights)
+    goal: GoalSpecification = field(default_factory=GoalSpecification, metadata=OPTIONAL)
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -148,15 +131,18 @@ class ReachTask(Checked):
             raise ProblemError(
                 f"{len(weights)} goal_weights for {len(self.goal_regions)} goal_regions"
             )
+        if self.reward.rotation and not self.goal.number:
+            raise ProblemError("reward weight rotation needs a goal with one, not a position")
 
     def goals_in(self, scene: Scene) -> Goals:
-        """Where goals lie in a scene."""
+        """Where the positions of goals lie in a scene."""
         regions = [scene.goal_region(name) for name in self.goal_regions]
         lower, upper = np.array([(r.lower, r.upper) for r in regions]).transpose(1, 0, 2)
         weights = self.goal_weights or (1.0,) * len(regions)
         moving = np.flatnonzero((upper - lower).any(axis=0))
         ends = np.cumsum(weights[:-1]) / sum(weights)
-        return Goals(lower, (upper - lower)[:, moving], moving, ends)
+        extent, no_rests = (upper - lower)[:, moving], np.zeros((len(regions), 0))
+        return Goals(lower, extent, moving, ends, no_rests)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -16,16 +16,15 @@ from kinarm.collision import ContactModel
 from kinarm.contact_shapes import PLANE, ContactShapes, unit_boxes
 from kinarm.episode_plants import EpisodePlants
 from kinarm.episode_scenes import drawn_rows
-from kinarm.episodes import Control, Episodes, Rules
+from kinarm.episodes import Control, Episodes, Pursuit, Rules
 from kinarm.errors import (
     LARGEST,
     InvalidInputError,
-    ProblemError,
     finite_array,
     one_or_many,
     whole_number,
 )
-from kinarm.inverse_kinematics import InverseKinematics
+from kinarm.goal_kinematics import GoalKinematics
 from kinarm.kernels.closest import Bodies
 from kinarm.kernels.compiling import Array
 from kinarm.kernels.records import recorded
@@ -37,10 +36,20 @@ from kinarm.plant import PlantLike
 from kinarm.problem import ProblemLike, ReachProblem
 from kinarm.scene_draws import SceneDraws
 from kinarm.step_contact import StepContact
-from kinarm.task import REWARD_TERMS, Goals
+
+NO_PURSUIT = recorded(
+    Pursuit(
+        *(np.zeros((0, 0)), np.zeros(0), np.zeros(0, np.int64), np.zeros(0, np.int64)),
+        *(np.zeros((0, 0, 3)), np.zeros((0, 0, 3))),
+    )
+)
+"""For standing points that are reached once touched."""
+
+UNIT_LENGTH = 1e-6
+"""How far the square of a direction's or quaternion's length may be from 1."""
 
 
-class World(InverseKinematics, StepContact):
+class World(GoalKinematics, StepContact):
     """An arm in a scene.
 
     Parameters
@@ -78,7 +87,7 @@ class World(InverseKinematics, StepContact):
         )
         self.arm = self.problem.load_arm()
         self.contact_model = ContactModel.build(self.arm, self.problem.scene)
-        self.starts = self._checked_starts()
+        self.starts = self.checked("task.starts", self.problem.task.starts)
         task, stepping = self.problem.task, self.problem.stepping
         self.rules = Rules(
             step_limit=self.arm.velocity_limits[: self.arm.n_actuated] * stepping.time_step,
@@ -92,22 +101,11 @@ class World(InverseKinematics, StepContact):
             shown=self.layout.shown,
             width=self.layout.width,
             boxes=unit_boxes(self.problem.scene.bodies),
+            goal=recorded(self.goal_rules()),
         )
         self.plants = EpisodePlants(self.problem, self.rules.step_limit)
         self.has_random_bodies = bool(self.problem.scene.random_bodies)
         self._idle: list[tuple[Block, Alone]] = []
-
-    def _checked_starts(self) -> Array:
-        """The task's starts, shape (n, n_joints), if all are possible [rad or m]."""
-        arm, starts = self.arm, np.empty((len(self.problem.task.starts), self.arm.n_joints))
-        for number, start in enumerate(self.problem.task.starts):
-            name = f"task.starts[{number}]"
-            given = finite_array(name, start, (arm.n_joints,))
-            starts[number] = within_limits(name, given, arm.chain, arm.joint_names)
-            pair = self.contact_model.contact_pair(starts[number])
-            if pair is not None:
-                raise ProblemError(f"{name} is in contact: {pair[0]} touches {pair[1]}")
-        return starts
 
     def __repr__(self) -> str:
         return f"World({self.problem!r})"
@@ -135,11 +133,6 @@ class World(InverseKinematics, StepContact):
         return kept | {"_idle": []}
 
     @cached_property
-    def goals(self) -> Goals:
-        """Where the task's goals lie."""
-        return self.problem.task.goals_in(self.problem.scene)
-
-    @cached_property
     def layout(self) -> ObservationLayout:
         """Where the parts of an observation are."""
         return ObservationLayout.of(self.problem, self.arm)
@@ -164,13 +157,17 @@ class World(InverseKinematics, StepContact):
         """Observations of configurations, shape (n, n_observations), also of those in contact.
 
         They are those of episodes that begin there, after so many steps. Takes joint positions,
-        shape (n, n_joints) [rad or m], and goals, shape (n, 3) [m].
+        shape (n, n_joints) [rad or m], and goals, shape (n, goal_width).
         """
         return self._begun_at(configurations, goals, step).observation
 
     def distances(self, configurations: ArrayLike, goals: ArrayLike) -> Array:
         """Distances of the tool from goals, shape (n,) [m]; see `observe`."""
         return self._begun_at(configurations, goals).distance
+
+    def turns(self, configurations: ArrayLike, goals: ArrayLike) -> Array:
+        """Errors of the goals' rests, shape (n,) [rad, or rad or m]; empty if they have none."""
+        return self._begun_at(configurations, goals).turn
 
     def screen(self, configurations: ArrayLike) -> tuple[Array, NDArray[np.bool_]]:
         """Tool points, shape (n, 3) [m], and which configurations touch something, shape (n,).
@@ -216,22 +213,22 @@ class World(InverseKinematics, StepContact):
         """Rows of the bodies of each episode, shape (n, n_placed, 16); empty if all have the same.
 
         See `kinarm.contact_shapes.ContactShapes.placed`. Takes starts, shape (n, n_joints) [rad or
-        m], and goals, shape (n, 3) [m]; ProblemError if a body finds no place.
+        m], and goals, shape (n, goal_width); ProblemError if a body finds no place.
         """
         if not self.has_random_bodies:
             return self._no_scenes
         drawn = self.problem.scene, self._draws, self.arm.chain
-        return drawn_rows(*drawn, starts, goals, self.threads)
+        return drawn_rows(*drawn, starts, np.ascontiguousarray(goals[:, :3]), self.threads)
 
     def in_scene(self, start: ArrayLike, goal: ArrayLike) -> "World":
         """The world of one episode, whose random bodies stay where they are.
 
-        Takes its start, shape (n_joints,) [rad or m], and its goal, shape (3,) [m].
+        Takes its start, shape (n_joints,) [rad or m], and its goal, shape (3 or goal_width,).
         """
         if not self.has_random_bodies:
             return self
         q = finite_array("start", start, (self.arm.n_joints,))
-        aim = finite_array("goal", goal, (3,))
+        aim = finite_array("goal", goal, (None,))
         other, scenes = copy(self), self.scenes_of(q[None], aim[None])
         other.has_random_bodies = False
         other.contact_model = self.contact_model.fixed(scenes[0])
@@ -253,9 +250,16 @@ class World(InverseKinematics, StepContact):
     def check_scenarios(self, starts: ArrayLike, goals: ArrayLike) -> tuple[Array, Array]:
         """Copy starts and goals, or refuse them."""
         q = finite_array("starts", starts, (None, self.arm.n_joints))
-        goal = finite_array("goals", goals, (len(q), 3))
+        goal = finite_array("goals", goals, (len(q), self.goal_width))
         if (farthest := np.abs(goal).max(initial=0.0)) > LARGEST:
             raise InvalidInputError(f"goals must lie within {LARGEST:g} m, got {farthest:g}")
+        if self.problem.task.goal.kind in ("direction", "pose") and len(goal):
+            off = np.abs(np.square(goal[:, 3:]).sum(axis=1) - 1.0)
+            if off.max() > UNIT_LENGTH:
+                raise InvalidInputError(
+                    f"directions and quaternions of goals must have length 1, but goal "
+                    f"{off.argmax()} has {goal[off.argmax(), 3:].tolist()}"
+                )
         return within_limits("starts", q, self.arm.chain, self.arm.joint_names), goal
 
     def clearance(self, configurations: ArrayLike) -> Clearance:
@@ -293,8 +297,8 @@ class World(InverseKinematics, StepContact):
 
         Parameters
         ----------
-        starts, goals : ndarray, shape (n, n_joints) and (n, 3)
-            Configurations [rad or m] and goal positions [m].
+        starts, goals : ndarray, shape (n, n_joints) and (n, goal_width)
+            Configurations [rad or m] and goals [m].
         record : bool
             Whether configurations are kept.
         shift : ndarray, shape (n_observations,), optional
@@ -302,6 +306,7 @@ class World(InverseKinematics, StepContact):
         """
         n, n_joints = starts.shape
         horizon, n_observations = self.rules.horizon, self.n_observations
+        goal = self.problem.task.goal
         shapes = self.contact_model.shapes
         own_scenes = self.has_random_bodies or len(shapes.moving) > 0
         plants = np.zeros((n if self.plants.width else 0, self.plants.width))
@@ -320,13 +325,30 @@ class World(InverseKinematics, StepContact):
             drive=self.plants.at_rest(plants, starts[: len(plants)]),
             sensed=starts.copy() if self.plants.width else starts[:0],
             goal=goals.copy(),
+            pursuit=NO_PURSUIT if goal.plain else self._pursuit(goals, record=record),
             observation=np.zeros((n, n_observations)),
             distance=np.zeros(n),
-            terms=np.zeros((n, len(REWARD_TERMS))),
+            terms=np.zeros((n, len(self.rules.reward))),
             total=np.zeros(n),
             moments=np.zeros((0 if shift is None else n, 2, n_observations)),
             shift=np.zeros(n_observations) if shift is None else shift.copy(),
             path=np.full((n, horizon + 1, n_joints) if record else (0, 0, n_joints), np.nan),
+        )
+
+    def _pursuit(self, goals: Array, *, record: bool) -> Any:
+        """Record of what episodes have besides, with only their first goals."""
+        n, width = goals.shape
+        count, horizon = self.problem.task.goal.count(self.rules.horizon), self.rules.horizon
+        kept = (n, horizon + 1, width) if record and count else (0, 0, width)
+        return recorded(
+            Pursuit(
+                reached=np.zeros((n, width)),
+                turn=np.zeros(n),
+                held=np.zeros(n, dtype=np.int64),
+                goals_reached=np.zeros(n, dtype=np.int64),
+                goals=np.repeat(goals[:, None], count, axis=1)[: n if count else 0],
+                path=np.full(kept, np.nan),
+            )
         )
 
     def session(self, control: Control, episodes: Episodes) -> Session:
@@ -353,7 +375,7 @@ class World(InverseKinematics, StepContact):
     def _begun_at(self, configurations: ArrayLike, goals: ArrayLike, step: int = 0) -> Episodes:
         """Episodes that begin at configurations, in contact or not."""
         q = finite_array("configurations", configurations, (None, self.arm.n_joints))
-        goal = finite_array("goals", goals, (len(q), 3))
+        goal = finite_array("goals", goals, (len(q), self.goal_width))
         session = self.session(Control(), self.episodes(q, goal))
         session.episodes.steps[:] = step
         if self.has_random_bodies and self.layout.sees_bodies:

@@ -17,6 +17,7 @@ from kinarm.bodies import Body, Point
 from kinarm.clearance import random_configurations
 from kinarm.contact_shapes import CUBE
 from kinarm.errors import InvalidInputError
+from kinarm.goals import GoalSpecification
 from kinarm.kernels.compiling import Array
 from kinarm.networks import Mirror
 from kinarm.problem import ReachProblem
@@ -38,11 +39,13 @@ def find_mirror(world: World) -> Mirror:
     side = world.layout.side
     if side is None:
         raise InvalidInputError("the observation has no part 'goal', which tells the side")
-    mirror = Mirror(world.layout.signs(axes), axes[: arm.n_actuated], side)
+    of_rest = {"direction": REFLECTION, "pose": (1.0, -1.0, 1.0, -1.0), "configuration": axes}
+    of_goal = np.concatenate([REFLECTION, of_rest.get(world.problem.task.goal.kind, ())])
+    mirror = Mirror(world.layout.signs(axes), axes[: arm.n_actuated], side, of_goal)
     rng = np.random.default_rng(0)
     q = rng.uniform(arm.lower, arm.upper, (TESTED_CONFIGURATIONS, arm.n_joints))
-    goals = rng.normal(size=(TESTED_CONFIGURATIONS, 3))
-    reflected = world.observe(axes * q, goals * REFLECTION)
+    goals = rng.normal(size=(TESTED_CONFIGURATIONS, world.goal_width))
+    reflected = world.observe(axes * q, goals * of_goal)
     apart = np.abs(reflected - world.observe(q, goals) * mirror.observations).max()
     if _beyond_limits(axes, arm.lower, arm.upper).any() or apart > ACCURACY:
         raise InvalidInputError(f"arm {arm.name!r} is not its own mirror image")
@@ -101,6 +104,9 @@ def _mirror_and_reason(problem: ReachProblem) -> tuple[Mirror | None, str]:
     """
     if not obstacles_are_symmetric(problem):
         return None, "obstacles are not their own mirror image"
+    motion = problem.task.goal.motion
+    if motion is not None and motion.reflected(REFLECTION) != motion:
+        return None, "the motion of goals is not its own mirror image"
     try:
         return find_mirror(World(problem, threads=1)), ""
     except InvalidInputError as error:
@@ -141,7 +147,15 @@ def is_symmetric(problem: ReachProblem) -> bool:
     regions = [scene.goal_region(name) for name in task.goal_regions]
     goals = {(region.lower, region.upper, w) for region, w in zip(regions, weights, strict=True)}
     reflected = {(*_reflected(lower, upper), w) for lower, upper, w in goals}
-    return goals == reflected and obstacles_are_symmetric(problem)
+    rests = _rests_are_symmetric(task.goal)
+    return goals == reflected and rests and obstacles_are_symmetric(problem)
+
+
+def _rests_are_symmetric(goal: GoalSpecification) -> bool:
+    """Whether the reflection surely maps what goals have beside a position to itself."""
+    turned = {(-roll, pitch, -yaw) for roll, pitch, yaw in goal.rotations}
+    level = goal.axis is None or goal.axis[1] == 0
+    return level and turned == set(goal.rotations) and not goal.configurations
 
 
 def _outline(body: Body, signs: Point = (1.0, 1.0, 1.0)) -> tuple[Any, ...]:

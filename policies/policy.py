@@ -315,7 +315,7 @@ def policy_of_content(content: Archive, where: str) -> Policy:
 
 
 GOAL_KEYS = ("observation", "achieved_goal", "desired_goal")
-"""Entries of a dictionary observation; the achieved goal is the tool point."""
+"""Entries of a dictionary observation; the achieved goal is what the tool has reached."""
 
 
 def flat_observation(
@@ -324,7 +324,7 @@ def flat_observation(
     """Make a flat observation of a dictionary observation.
 
     It holds just ``observation``, shape (..., n_own), ``achieved_goal`` and ``desired_goal``, shape
-    (..., 3) [m]. The flat one has the shape (..., n_observations), of the layout.
+    (..., goal_width) [m]. The flat one has the shape (..., n_observations), of the layout.
     """
     if set(given) != set(GOAL_KEYS):
         raise InvalidInputError(
@@ -333,11 +333,12 @@ def flat_observation(
         )
     if layout.history > 1:
         raise InvalidInputError("a policy with a history needs a flat observation")
-    (goals, offsets), entries = layout.goal_places, layout.entries(of_goal=False)
+    (goals, offsets), entries = layout.goal_entries, layout.entries(of_goal=False)
     batch = np.shape(given["desired_goal"])[:-1]
     rows = (None,) * len(batch)
     goal, tool = (
-        finite_array(name, given[name], (*rows, 3)) for name in ("desired_goal", "achieved_goal")
+        finite_array(name, given[name], (*rows, len(goals)))
+        for name in ("desired_goal", "achieved_goal")
     )
     rest = finite_array("observation", given["observation"], (*rows, len(entries)))
     flat = np.empty((*batch, layout.size))

@@ -46,6 +46,9 @@ class TrialOutcomes(NamedTuple):
         Sums of rewards.
     success, collision : ndarray of bool
         How the trials ended.
+    turn, goals_reached : ndarray
+        Final errors of the goals' rests [rad, or rad or m], and goals reached; or
+        empty.
     """
 
     distance: NDArray[np.float64]
@@ -53,6 +56,8 @@ class TrialOutcomes(NamedTuple):
     returns: NDArray[np.float64]
     success: NDArray[np.bool_]
     collision: NDArray[np.bool_]
+    turn: NDArray[np.float64] = np.zeros(0)
+    goals_reached: NDArray[np.int64] = np.zeros(0, dtype=np.int64)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -100,7 +100,7 @@ class Marker(NamedTuple):
 def markers(group: Group) -> list[Marker]:
     """Goals of the first trials of a problem, the worst last, on top."""
     means, reached = group.distances.mean(axis=0).tolist(), group.success.sum(axis=0).tolist()
-    goals = group.members[0].trials.goals.tolist()
+    goals = group.members[0].trials.goals[:, :3].tolist()
     columns = (range(len(goals)), goals, means, worst_outcomes(group), reached)
     shown = islice(zip(*columns, strict=True), MARKERS)
     return sorted((Marker(*each) for each in shown), key=lambda marker: marker.distance)
@@ -114,7 +114,7 @@ def failure_shares(
     Each with the ends of its slice [m], ascending; None where no goal lies.
     """
     goals, failed = group.members[0].trials.goals, 1 - group.success.mean(axis=0)
-    inside = ((region.lower <= goals) & (goals <= region.upper)).all(axis=1)
+    inside = ((region.lower <= goals[:, :3]) & (goals[:, :3] <= region.upper)).all(axis=1)
     slices = np.linspace(region.lower[0], region.upper[0], SLICES + 1)
     places = np.clip(np.searchsorted(slices, goals[:, 0], side="right") - 1, 0, SLICES - 1)
     rows = [inside & (places == place) for place in range(SLICES)]

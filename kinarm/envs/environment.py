@@ -23,7 +23,6 @@ from kinarm.plant import MOST_NOISE, RANGES
 from kinarm.problem import ProblemLike, ReachProblem
 from kinarm.scenarios import ScenarioQueues
 from kinarm.simulator import Simulator
-from kinarm.task import REWARD_TERMS
 
 Array = NDArray[np.float64]
 Observations = Any
@@ -33,8 +32,6 @@ Outcome = tuple[Array, NDArray[np.bool_], NDArray[np.bool_]]
 """Rewards, and which episodes terminated or were truncated, shape (n,) each."""
 
 DTYPES = ("float64", "float32")
-
-TERM_KEYS = tuple(f"reward_{name}" for name in REWARD_TERMS)
 
 SETTINGS = (
     *(
@@ -130,10 +127,10 @@ def state_bounds(simulator: Simulator) -> tuple[Array, Array]:
     noise, resolution = MOST_NOISE * most["noise"], most["resolution"]
     off = noise + resolution + most["bias"] + most["calibration"]
     missed = task.tolerance + most["goal_bias"] + MOST_NOISE * most["goal_noise"]
-    regions = [simulator.scene.goal_region(name) for name in task.goal_regions]
+    goal_lower, goal_upper = simulator.world.goal_bounds
     ranges = Ranges(
-        goal_lower=np.min([region.lower for region in regions], axis=0) - missed,
-        goal_upper=np.max([region.upper for region in regions], axis=0) + missed,
+        goal_lower=goal_lower - missed,
+        goal_upper=goal_upper + missed,
         reach=arm.reach,
         lower=arm.lower - off,
         upper=arm.upper + off,
@@ -216,7 +213,9 @@ class ArmEnvironment(Lifecycle):
             self.interface.extra = extra
             self.interface.observation_space = extra.space(self.interface.observation_space)
         self.metadata = self.interface.metadata
-        self._told = ("distance", *(TERM_KEYS if self.interface.tells_terms else ()))
+        terms = simulator.task.reward.terms if self.interface.tells_terms else ()
+        told = (*simulator.task.goal.told, *(f"reward_{name}" for name in terms))
+        self._told = ("distance", *told)
         self._queues, self._n_arms = ScenarioQueues(simulator.world, num_envs), num_envs
         self._pictures = EnvPictures(simulator, render_mode, num_envs, **picture)
 
@@ -224,7 +223,8 @@ class ArmEnvironment(Lifecycle):
         """Begin episodes of some arms; options may set ``start`` and ``goal``."""
         if self._episodes is None:
             n_joints = self.simulator.arm.n_joints
-            q, goals = np.zeros((self._n_arms, n_joints)), np.zeros((self._n_arms, 3))
+            width = self.simulator.world.goal_width
+            q, goals = np.zeros((self._n_arms, n_joints)), np.zeros((self._n_arms, width))
         else:
             q, goals = self._episodes.q, self._episodes.goal
         fixed = fixed_scenario(options, self.simulator, self._n_arms)
@@ -293,8 +293,8 @@ def fixed_scenario(
     ----------
     options : mapping, optional
         ``start``, shape (n_joints,) or (n, n_joints) [rad or m], and ``goal``,
-        shape (3,) or (n, 3) [m]: one for all arms, or one for each. In a scene
-        with random bodies, both.
+        shape (goal_width,) or (n, goal_width) [m]: one for all arms, or one for
+        each. In a scene with random bodies, both.
     simulator, n : Simulator and int
         Where, and the number of arms.
 
@@ -304,7 +304,7 @@ def fixed_scenario(
         The same, one row an arm.
     """
     arm, fixed, wanted = simulator.arm, {}, options or {}
-    widths = {"start": arm.n_joints, "goal": 3}
+    widths = {"start": arm.n_joints, "goal": simulator.world.goal_width}
     if len(wanted) == 1 and simulator.world.has_random_bodies:
         raise InvalidInputError("start and goal decide where random bodies are: set both")
     for name, value in wanted.items():

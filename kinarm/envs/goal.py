@@ -20,6 +20,8 @@ from kinarm.envs.reach import ReachEnv
 from kinarm.envs.vector import ReachVectorEnv
 from kinarm.episodes import TRUNCATED, Episodes, StepResult
 from kinarm.errors import InvalidInputError
+from kinarm.kernels.goals import errors_between
+from kinarm.observation_choice import REST_PARTS
 from kinarm.simulator import Simulator
 
 RewardType = Literal["sparse", "dense"]
@@ -38,8 +40,8 @@ class GoalRewards:
 
         Parameters
         ----------
-        achieved_goal, desired_goal : array_like, shape (..., 3)
-            Tool point and goal [m].
+        achieved_goal, desired_goal : array_like, shape (..., goal_width)
+            What the tool has reached, its point first, and goal [m].
         info : mapping or sequence of mapping
             That of the step, or one for each, with ``collision``.
 
@@ -47,9 +49,11 @@ class GoalRewards:
         -------
         float or ndarray, shape (...)
         """
-        task, distance = self.simulator.task, _distance(achieved_goal, desired_goal)
-        sparse = self.reward_type == "sparse"
-        reached = np.where(distance <= task.tolerance, 0.0, -1.0) if sparse else -distance
+        task, (distance, turn) = self.simulator.task, self._errors(achieved_goal, desired_goal)
+        if self.reward_type == "sparse":
+            reached = np.where(self._within(distance, turn), 0.0, -1.0)
+        else:
+            reached = -(distance + task.reward.rotation * turn)
         return (reached + task.reward.collision * _collided(info))[()]
 
     def compute_terminated(
@@ -65,7 +69,7 @@ class GoalRewards:
         achieved_goal, desired_goal, info
             As for `compute_reward`; infos have no effect.
         """
-        return _distance(achieved_goal, desired_goal) <= self.simulator.task.tolerance
+        return self._within(*self._errors(achieved_goal, desired_goal))
 
     def compute_truncated(
         self, achieved_goal: ArrayLike, desired_goal: ArrayLike, info: object
@@ -78,6 +82,25 @@ class GoalRewards:
             As for `compute_reward`, without effect.
         """
         return self.compute_terminated(achieved_goal, desired_goal, info) & False
+
+    def _within(self, distance: NDArray[np.float64], turn: NDArray[np.float64]) -> Any:
+        """Whether errors are within the tolerances."""
+        task = self.simulator.task
+        return (distance <= task.tolerance) & (turn <= task.goal.rotation_tolerance)
+
+    def _errors(self, achieved: ArrayLike, desired: ArrayLike) -> tuple[Any, Any]:
+        """Distances [m] and turns [rad, or rad or m] of achieved goals from desired ones."""
+        pairs = np.broadcast_arrays(np.asarray(achieved, float), np.asarray(desired, float))
+        shape, width = pairs[0].shape[:-1], self.simulator.world.goal_width
+        if pairs[0].shape[-1:] != (width,):
+            raise InvalidInputError(
+                f"goals must have the shape (..., {width}), got {pairs[0].shape}"
+            )
+        reached, wanted = (np.array(each.reshape(-1, width), order="C") for each in pairs)
+        errors = np.empty((2, len(reached)))
+        errors_between(self.simulator.task.goal.number, reached, wanted, *errors)
+        distance, turn = errors.reshape(2, *shape)
+        return distance[()], turn[()]
 
 
 class GoalInterface(GoalRewards, Interface):
@@ -100,16 +123,25 @@ class GoalInterface(GoalRewards, Interface):
                 f"reward_type must be one of {list(get_args(RewardType))}, got {reward_type!r}"
             )
         self.reward_type = reward_type
-        layout = simulator.world.layout
-        (self._goal, self._offset), self._own = layout.goal_places, layout.entries(of_goal=False)
+        layout, goal = simulator.world.layout, simulator.task.goal
+        (self._goal, self._offset), self._own = layout.goal_entries, layout.entries(of_goal=False)
+        if goal.hold > 1 or goal.speed is not None or goal.changes:
+            raise InvalidInputError(
+                "goals as a dictionary stand and are reached once touched: hold, speed, sequence, "
+                "motion and wander do not apply"
+            )
+        if len(self._goal) != simulator.world.goal_width:
+            parts = " and ".join(REST_PARTS[goal.kind])
+            raise InvalidInputError(f"goals as a dictionary need the observation's parts {parts}")
         super().__init__(simulator, dtype)
 
     def _space(self) -> Space[Any]:
         lower, upper = state_bounds(self.simulator)
         reach = np.full(3, self.simulator.arm.reach)
+        rest = self._goal[3:]
         bounds = {
             "observation": (lower[self._own], upper[self._own]),
-            "achieved_goal": (-reach, reach),
+            "achieved_goal": (np.r_[-reach, lower[rest]], np.r_[reach, upper[rest]]),
             "desired_goal": (lower[self._goal], upper[self._goal]),
         }
         return Dict({name: bounded_space(pair, self._dtype) for name, pair in bounds.items()})
@@ -121,7 +153,7 @@ class GoalInterface(GoalRewards, Interface):
         return {"observation": own, "achieved_goal": achieved, "desired_goal": desired}
 
     def _goals(self, observations: Array) -> tuple[NDArray[Any], NDArray[Any]]:
-        """Tool points and goals, shape (n, 3) each [m]."""
+        """What is reached, and goals, shape (n, goal_width) each."""
         goals = observations[:, self._goal]
         tools = goals - observations[:, self._offset]
         return tools.astype(self._dtype, copy=False), goals.astype(self._dtype)
@@ -161,15 +193,15 @@ class ReachGoalEnv(GoalEnvironment, ReachEnv):
         -1 for each step but 0 for one that reaches the goal, or minus the
         distance [m].
     **settings
-        As for `ReachEnv`; only ``collision`` of the problem's own reward has an
-        effect.
+        As for `ReachEnv`; only ``collision`` and ``rotation`` of the problem's
+        own reward have an effect.
 
     Notes
     -----
     **Observation**, ``Dict``: ``observation``, the part of the observation of `ReachEnv` that does
     not depend on the goal (orientations and positions of the joint frames, 42 numbers for the
     arms of six joints); ``achieved_goal``, the tool point x, y, z [m]; ``desired_goal``, the goal
-    x, y, z [m].
+    x, y, z [m]. Goals with a direction, a rotation or joints have these behind.
 
     **Reward**: that of the reward type, and the problem's ``collision`` (-1 by
     default) if a move was refused. ``compute_reward(achieved_goal,
@@ -207,11 +239,3 @@ def _collided(info: Any) -> NDArray[np.bool_]:
     if isinstance(info, Mapping):
         return np.asarray(info.get("collision", False))
     return np.array([each.get("collision", False) for each in info], dtype=bool)
-
-
-def _distance(first: ArrayLike, second: ArrayLike) -> Array:
-    """Distances between points, shape (..., 3) each."""
-    apart = np.asarray(first, dtype=np.float64) - np.asarray(second, dtype=np.float64)
-    squares = apart**2
-    # Term by term: the sum does not depend on the number of points.
-    return np.sqrt(squares[..., 0] + squares[..., 1] + squares[..., 2])

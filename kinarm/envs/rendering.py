@@ -113,12 +113,13 @@ class EnvPictures:
         self._traces[np.arange(self._num_envs), episodes.steps] = self._tools(episodes)
         for row in np.flatnonzero(episodes.status == COLLISION).tolist():
             if row not in self._contacts:
-                world = self._simulator.world.in_scene(self._starts[row], episodes.goal[row])
+                world = self._simulator.world.in_scene(self._starts[row], episodes.first_goals[row])
                 refused, step = (episodes.q[row], episodes.target[row]), int(episodes.steps[row])
                 self._contacts[row] = world.contact(*refused, step=step - 1)
         if self.mode == "human":
             stage = self._live_stage()
             stage.show(episodes.q[0], int(episodes.steps[0]))
+            stage.aim(episodes.goal[0])
             stage.draw_trace(*self._way(0))
             stage.pace(self._simulator.problem.stepping.time_step)
 
@@ -152,7 +153,7 @@ class EnvPictures:
         if key not in self._renderers:
             from kinarm.viewer.renderer import Renderer
 
-            episode = self._starts[row], self._begun.goal[row]
+            episode = self._starts[row], self._begun.first_goals[row]
             scene = scene_of_episode(world.problem.scene, world.arm, *episode)
             problem, (width, height) = world.problem.replace(scene=scene), self._size
             self._renderers[key] = Renderer(

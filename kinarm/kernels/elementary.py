@@ -16,6 +16,10 @@ QUARTERS = 0.63661977236758134308
 ROUNDING = 1.5 * 2.0**52
 """Added and subtracted, it leaves the nearest whole number."""
 
+QUARTER_PI = 7.85398163397448309616e-1
+SMALLEST = 1e-300
+"""Below all lengths that are told apart from 0."""
+
 LOG_2 = 6.93145751953125e-1
 LOG_2_REST = 1.42860682030941723212e-6
 LOG_2_INVERSE = 1.4426950408889634074
@@ -79,3 +83,29 @@ def hyperbolic_tangent(x: float) -> float:
     small = x + x * z * (p / q)
     large = 1.0 - 2.0 / (exponential(2.0 * min(size, 20.0)) + 1.0)
     return select(size < 0.625, small, select(x < 0.0, -large, large))
+
+
+@inlined
+def angle_of(sine: float, cosine: float) -> float:
+    """Angle in [0, pi] with a sine and a cosine in this ratio, to within 1e-15.
+
+    The sine must not be negative. If both are 0, it is a right angle.
+    """
+    size = abs(cosine)
+    steep = sine >= size
+    short, long = select(steep, size, sine), select(steep, sine, size)
+    large = short > 0.66 * long
+    over, under = select(large, short - long, short), select(large, short + long, long)
+    x = over / max(under, SMALLEST)
+    z = x * x
+    p = -7.500855792314704667340e1 + z * (
+        -1.615753718733365076637e1 + z * -8.750608600031904122785e-1
+    )
+    p = -6.485021904942025371773e1 + z * (-1.228866684490136173410e2 + z * p)
+    q = 4.328810604912902668951e2 + z * (
+        1.650270098316988542046e2 + z * (2.485846490142306297962e1 + z)
+    )
+    q = 1.945506571482613964425e2 + z * (4.853903996359136964868e2 + z * q)
+    angle = x + x * z * (p / q) + select(large, QUARTER_PI, 0.0)
+    angle = select(steep, 2.0 * QUARTER_PI - angle, angle)
+    return select(cosine < 0.0, 4.0 * QUARTER_PI - angle, angle)

@@ -191,6 +191,8 @@ def sense(chain: Chain, rules: Rules, block: Block) -> None:
         block.sensed[0, axis] += bias - calibration
     for i in range(3):
         block.seen_goal[0, i] = block.goal[0, i] + plant[0, OFFSETS + 2 * n_actuated + i]
+    for i in range(3, block.goal.shape[1]):
+        block.seen_goal[0, i] = block.goal[0, i]
     if any_lane((plant[0, NOISE] > 0.0) | (plant[0, GOAL_NOISE] > 0.0)):
         add_noise(block, n_actuated)
     if rules.commanded == 1:

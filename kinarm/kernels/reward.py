@@ -13,8 +13,11 @@ from kinarm.kernels.session import Block, Session
 from kinarm.kernels.surroundings import Seen
 from kinarm.observation import write_observation
 
-PROGRESS, CLOSER, STEP, COLLISION, SUCCESS = range(5)
-"""Columns of the terms; `COLLISION` and later ones are paid at the end."""
+PROGRESS, CLOSER, STEP, COLLISION, SUCCESS, ROTATION = range(6)
+"""Columns of the terms; `COLLISION` and `SUCCESS` are paid at the end.
+
+`ROTATION` is there if it counts, and whoever calls `add_reward` fills it in.
+"""
 
 
 @inlined

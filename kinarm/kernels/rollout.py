@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kinarm.episodes import COLLISION, PAUSED, RUNNING, SUCCESS, TRUNCATED, Episodes, Rules
+from kinarm.kernels.arriving import arrive, measure, put_goal
 from kinarm.kernels.compiling import Array, inlined, lean_kernel
 from kinarm.kernels.kinematics import forward_kinematics, place_bodies
 from kinarm.kernels.lanes import LANES, any_lane, as_numbers, lane_bits, select
@@ -22,7 +23,7 @@ from kinarm.kernels.proof import (
     prove_step,
     renew_planes,
 )
-from kinarm.kernels.reward import add_reward, observe, remember
+from kinarm.kernels.reward import ROTATION, add_reward, observe, remember
 from kinarm.kernels.session import (
     Session,
     load_episode,
@@ -66,6 +67,14 @@ def begin(counters: NDArray[np.int64], session: Session, rows: NDArray[np.int64]
                 move_bodies(e, step, lane, shapes, rules, episodes.scenes, block.after)
         forward_kinematics(chain, block.q, 0, block.after)
         free, _ = prove_configurations(shapes, 0, filled, block, alone)
+        if block.turn.shape[0] > 0:
+            pursuit = episodes.pursuit
+            if pursuit.goals.shape[0] > 0:
+                for lane in range(filled):
+                    e = rows[start + lane]
+                    step, number = episodes.steps[e], pursuit.goals_reached[e]
+                    put_goal(e, step, number, lane, rules.goal, pursuit.goals, block.goal)
+            measure(chain, rules.goal, block.after, block)
         if block.plant.shape[0] > 0:
             sense(chain, rules, block)
         remember(block)
@@ -84,6 +93,13 @@ def begin(counters: NDArray[np.int64], session: Session, rows: NDArray[np.int64]
             episodes.distance[e] = distances[0, lane]
             for term in range(episodes.terms.shape[1]):
                 episodes.terms[e, term] = 0.0
+            if block.turn.shape[0] > 0:
+                pursuit = episodes.pursuit
+                take(block.goal, 0, lane, episodes.goal, e)
+                take(block.reached, 0, lane, pursuit.reached, e)
+                pursuit.turn[e], pursuit.held[e] = as_numbers(block.turn)[0, lane], 0
+                if pursuit.path.shape[0] > 0:
+                    take(block.goal, 0, lane, pursuit.path[e], 0)
             take(block.observation, 0, lane, episodes.observation, e)
             if block.plant.shape[0] > 0:
                 take(block.sensed, 0, lane, episodes.sensed, e)
@@ -185,17 +201,22 @@ def advance(counters: NDArray[np.int64], session: Session) -> int:
         remember(block)
         for joint in range(n_joints):
             block.q[0, joint] = block.target[0, joint]
+        if block.turn.shape[0] > 0:
+            reached = arrive(chain, rules, poses, row, episodes, block)
         if block.plant.shape[0] > 0:
             sense(chain, rules, block)
         after = observe(session, poses)
-        block.distance[0] = after
-        reached, never = after <= rules.tolerance, after < 0.0
-        add_reward(rules.reward, nearer, after, never, reached, block.terms, block.total, 0)
+        if block.turn.shape[0] == 0:
+            block.distance[0] = after
+            reached, never = after <= rules.tolerance, after < 0.0
+            add_reward(rules.reward, nearer, after, never, reached, block.terms, block.total, 0)
         if episodes.path.shape[0] > 0:
             for lane in range(row.shape[0]):
                 if row[lane] >= 0:
                     step = int(as_numbers(block.steps)[0, lane])
                     take(block.q, 0, lane, episodes.path[row[lane]], step)
+                    if block.turn.shape[0] > 0 and episodes.pursuit.path.shape[0] > 0:
+                        take(block.goal, 0, lane, episodes.pursuit.path[row[lane]], step)
         # Take out what has ended or is to be handed back.
         late = block.steps[0] >= rules.horizon
         finished = lane_bits((block.steps[0] >= block.stop[0]) | reached | late)
@@ -244,10 +265,16 @@ def results_of_step(
     for e in range(contact.shape[0]):
         stepped = episodes.steps[e] == episodes.stop[e]
         reward = 0.0
+        first = numbers.shape[0] - episodes.terms.shape[1]
         for term in range(episodes.terms.shape[1]):
             part = episodes.terms[e, term] if stepped else 0.0
-            numbers[2 + term, e] = part
+            numbers[first + term, e] = part
             reward += part
+        if session.block.turn.shape[0] > 0:
+            if session.rules.goal.kind > 0:
+                numbers[2, e] = episodes.pursuit.turn[e]
+            if session.rules.goal.sequence > 1:
+                numbers[first - 1, e] = episodes.pursuit.goals_reached[e]
         numbers[0, e] = reward
         numbers[1, e] = episodes.distance[e]
         refused = stepped and episodes.status[e] == COLLISION
@@ -272,7 +299,12 @@ def refuse_step(e: int, rules: Rules, episodes: Episodes) -> None:
     if episodes.drive.shape[0] > 0:
         rest(e, episodes)
     distance = episodes.distance[e]
+    if rules.reward.shape[0] > ROTATION:
+        episodes.terms[e, ROTATION] = 0.0
     add_reward(rules.reward, distance, distance, True, False, episodes.terms, episodes.total, e)
     if episodes.path.shape[0] > 0:
         for joint in range(episodes.q.shape[1]):
             episodes.path[e, episodes.steps[e], joint] = episodes.q[e, joint]
+    if episodes.pursuit.path.shape[0] > 0:
+        for i in range(episodes.goal.shape[1]):
+            episodes.pursuit.path[e, episodes.steps[e], i] = episodes.goal[e, i]

@@ -43,6 +43,7 @@ def layouts(
     summed: int = 0,
     plant: int = 0,
     drive: int = 0,
+    goal_width: int = 0,
 ) -> tuple[Layout, Layout]:
     """Layouts of a block and of a single episode's space.
 
@@ -59,13 +60,19 @@ def layouts(
         Summed entries of the observation, all or none.
     plant, drive : int
         Numbers of an episode's plant, and rows of its state; 0 if it is ideal.
+    goal_width : int
+        Length of goals; 0 for standing points that are reached at once.
     """
-    has_plant = Fixed(plant > 0)
+    has_plant, beyond = Fixed(plant > 0), Fixed(goal_width > 0)
     block = {
-        # Configuration, target of the step [rad or m], and goal [m].
+        # Configuration, target of the step [rad or m], and goal, its position first [m].
         "q": (ONE, n_joints),
         "target": (ONE, n_joints),
-        "goal": (ONE, THREE),
+        "goal": (ONE, goal_width or THREE),
+        # What the tool has reached, and seems to have; its error of rotation, steps within the
+        # tolerances, and goals reached.
+        **dict.fromkeys(("reached", "seen_reached"), (beyond, goal_width)),
+        **dict.fromkeys(("turn", "held", "goals_reached"), (beyond,)),
         # Observation, and its mirror image for networks.
         "observation": (ONE, n_observations),
         "seen": (ONE, n_observations),
@@ -75,7 +82,7 @@ def layouts(
         "sensed": (has_plant, n_joints),
         # Joint positions as seen before the step.
         "former": (ONE, n_joints),
-        "seen_goal": (has_plant, THREE),
+        "seen_goal": (has_plant, goal_width or THREE),
         "seen_poses": (has_plant * (n_joints + 1), Fixed(POSE)),
         # Poses before and after the step, which swap from step to step.
         **dict.fromkeys(("before", "after"), (n_joints + 1 + n_placed, Fixed(POSE))),
@@ -215,6 +222,12 @@ def load_episode(
     put(episodes.q, e, block.q, 0, lane)
     put(episodes.target, e, block.target, 0, lane)
     put(episodes.goal, e, block.goal, 0, lane)
+    if block.turn.shape[0] > 0:
+        pursuit = episodes.pursuit
+        put(pursuit.reached, e, block.reached, 0, lane)
+        as_numbers(block.turn)[0, lane] = pursuit.turn[e]
+        as_numbers(block.held)[0, lane] = pursuit.held[e]
+        as_numbers(block.goals_reached)[0, lane] = pursuit.goals_reached[e]
     remembers = rules.width < block.observation.shape[1]
     if control.layers.shape[0] > 0 or block.moments.shape[1] > 0 or remembers:
         put(episodes.observation, e, block.observation, 0, lane)
@@ -247,6 +260,13 @@ def store_episode(lane: int, e: int, episodes: Episodes, block: Block) -> None:
     steps = int(as_numbers(block.steps)[0, lane])
     take(block.q, 0, lane, episodes.q, e)
     take(block.target, 0, lane, episodes.target, e)
+    if block.turn.shape[0] > 0:
+        take(block.goal, 0, lane, episodes.goal, e)
+        pursuit = episodes.pursuit
+        take(block.reached, 0, lane, pursuit.reached, e)
+        pursuit.turn[e] = as_numbers(block.turn)[0, lane]
+        pursuit.held[e] = int(as_numbers(block.held)[0, lane])
+        pursuit.goals_reached[e] = int(as_numbers(block.goals_reached)[0, lane])
     if steps > episodes.steps[e]:
         take(block.observation, 0, lane, episodes.observation, e)
     take_rows(block.planes, lane, episodes.planes[e])
@@ -301,6 +321,7 @@ class Session(Record):
             summed=n_observations if len(self.episodes.moments) > 0 else 0,
             plant=self.episodes.plant.shape[1],
             drive=self.episodes.drive.shape[1],
+            goal_width=self.episodes.pursuit.reached.shape[1],
         )
         furnish(shapes.values.placed, *space)
         parts = SessionFields(chain, shapes, rules, control, episodes, *space)

@@ -34,6 +34,7 @@ from kinarm.viewer.parts import (
     TRACES,
     Finish,
     cube_mesh,
+    goal_marks,
     obstacle_meshes,
 )
 from kinarm.viewer.visual_shapes import arm_parts
@@ -283,9 +284,11 @@ def aim_camera(window: Visualizer, scale: float = 1.0) -> None:
 
 
 def draw_goal(window: Visualizer, problem: ReachProblem) -> None:
-    """The cube, and the halo of its tolerance, about the origin."""
+    """The cube, the halo of its tolerance, and axes if it has a rotation, about the origin."""
     put(window["cube"], CUBE, cube_mesh(problem.scene))
     put(window["halo"], HALO, capsule(0.0, problem.task.tolerance))
+    for number, (finish, mesh) in enumerate(goal_marks(problem.task.goal)):
+        put(window[f"axis_{number}"], finish, mesh)
 
 
 def draw_arm(window: Visualizer, arm: Arm) -> list[Visualizer]:

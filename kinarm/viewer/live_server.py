@@ -27,6 +27,7 @@ from kinarm.viewer.drawing import (
     draw_surroundings,
     draw_trace,
 )
+from kinarm.viewer.parts import goal_pose
 
 HOST = "127.0.0.1"
 PORT, LAST_PORT = 7000, 65535
@@ -140,13 +141,15 @@ class LiveStage:
 
     def begin(self, configuration: NDArray[np.float64], goal: ArrayLike) -> None:
         """Show a start and a goal [rad or m, m], without a way."""
-        place = np.eye(4)
-        place[:3, 3] = goal
-        self.server.window["goal"].set_transform(place)
+        self.aim(goal)
         self.server.window["trace"].delete()
         shown = self.server.window, "random", self._problem.scene, self._arm
-        self._moving = draw_random_bodies(*shown, configuration, place[:3, 3])
+        self._moving = draw_random_bodies(*shown, configuration, np.asarray(goal))
         self.show(configuration)
+
+    def aim(self, goal: ArrayLike) -> None:
+        """Show a goal [m]."""
+        self.server.window["goal"].set_transform(goal_pose(self._problem.task.goal, goal))
 
     def show(self, configuration: NDArray[np.float64], step: int = 0) -> None:
         """Move the arm to a configuration [rad or m], and bodies to where they are after a step."""

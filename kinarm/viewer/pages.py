@@ -13,9 +13,10 @@ from typing import Any
 
 import coal
 import numpy as np
+import pinocchio as pin
 from jinja2 import Environment, FunctionLoader, StrictUndefined
 from markupsafe import Markup
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from kinarm._files import write_text
 from kinarm.arm import Arm
@@ -24,7 +25,7 @@ from kinarm.body_motion import BodyMotion
 from kinarm.collision import ContactModel
 from kinarm.enclosures import core
 from kinarm.errors import InvalidInputError
-from kinarm.problem import ProblemLike
+from kinarm.problem import ProblemLike, ReachProblem
 from kinarm.recording import Recording, record_path
 from kinarm.scene import Scene
 from kinarm.viewer.camera import stage_scale
@@ -37,7 +38,7 @@ from kinarm.viewer.drawing import (
     draw_trace,
     put,
 )
-from kinarm.viewer.parts import OUTCOME_COLOURS, TRACE_SIDES
+from kinarm.viewer.parts import OUTCOME_COLOURS, TRACE_SIDES, goal_pose
 from kinarm.viewer.visual_shapes import arm_parts, collision_parts, link_joints
 from kinarm.world import World
 
@@ -263,12 +264,13 @@ def _check_recordings(recordings: Sequence[Recording], ghosts: Sequence[Recordin
 def _trial_data(runs: Sequence[Recording], moving: Mapping[str, BodyMotion]) -> dict[str, Any]:
     """A trial that was recorded, and what moves in it, as JSON."""
     first, problem = runs[0], runs[0].problem
+    goals = first.goal[None] if first.goals is None else first.goals
     steps = np.arange(max(len(run.states) for run in runs), dtype=np.float64)
     times = steps * problem.stepping.time_step
     return {
         "problem": problem.name,
         "trial": first.trial,
-        "goal": first.goal.tolist(),
+        "goals": [_placed(problem, goal) for goal in goals],
         "tolerance": problem.task.tolerance,
         "horizon": problem.task.horizon,
         "timeStep": problem.stepping.time_step,
@@ -285,6 +287,12 @@ def _trial_data(runs: Sequence[Recording], moving: Mapping[str, BodyMotion]) -> 
             for run in runs
         ],
     }
+
+
+def _placed(problem: ReachProblem, goal: NDArray[np.float64]) -> list[float]:
+    """Position of a goal [m], and quaternion x y z w of its marks."""
+    pose = goal_pose(problem.task.goal, goal)
+    return [*pose[:3, 3].tolist(), *pin.Quaternion(pose[:3, :3]).coeffs().tolist()]
 
 
 class ArmPage(HtmlPage):

@@ -5,10 +5,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from kinarm.bodies import Body
+from kinarm.bodies import Body, rotation_of_quaternion
+from kinarm.goals import GoalSpecification, quaternion_between
 from kinarm.meshes import coal_shape
 from kinarm.scene import GoalRegion, Scene
-from kinarm.viewer.meshes import Mesh, box, from_coal
+from kinarm.viewer.meshes import Mesh, box, from_coal, tube
 
 Array = NDArray[np.float64]
 
@@ -142,6 +143,32 @@ def _lies_on(region: GoalRegion, body: Body, edge: float) -> bool:
     above = all(region.lower[k] < upper[k] and lower[k] < region.upper[k] for k in (0, 1))
     upright = body.rotation[2, 2] == 1.0
     return upright and above and 0 <= region.lower[2] - round(upper[2], 12) <= edge
+
+
+AXES = tuple(Finish(colour, roughness=0.5) for colour in (0xC63D3D, 0x3E9C4F, 0x2F6FC4))
+"""Finishes of the axes x, y and z."""
+
+MARK_LENGTH, MARK_RADIUS = 0.12, 0.004
+"""Of an axis that marks a goal's rotation [m]."""
+
+
+def goal_marks(goal: GoalSpecification) -> list[tuple[Finish, Mesh]]:
+    """Axes about the origin that show a goal's rotation; for a direction, z alone."""
+    ends = MARK_LENGTH * np.eye(3)
+    shown = {"pose": (0, 1, 2), "direction": (2,)}.get(goal.kind, ())
+    return [(AXES[k], tube([0.1 * ends[k], ends[k]], MARK_RADIUS, TRACE_SIDES)) for k in shown]
+
+
+def goal_pose(goal: GoalSpecification, row: ArrayLike) -> Array:
+    """Where a goal and its marks are, shape (4, 4) [m]."""
+    pose, given = np.eye(4), np.asarray(row, dtype=np.float64)
+    pose[:3, 3], turn = given[:3], given[3:]
+    if goal.kind == "direction":
+        turn = quaternion_between(np.array([0.0, 0.0, 1.0]), turn)
+    if goal.kind in ("direction", "pose"):
+        w, x, y, z = turn.tolist()
+        pose[:3, :3] = rotation_of_quaternion((w, x, y, z))
+    return pose
 
 
 def cube_mesh(scene: Scene) -> Mesh:

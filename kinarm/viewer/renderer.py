@@ -27,6 +27,8 @@ from kinarm.viewer.parts import (
     Finish,
     channels,
     cube_mesh,
+    goal_marks,
+    goal_pose,
     obstacle_meshes,
 )
 from kinarm.viewer.visual_shapes import arm_parts, link_joints
@@ -119,8 +121,8 @@ class Renderer:
 
         Parameters
         ----------
-        configuration, goal : array_like, shapes (n_joints,) and (3,)
-            Joint positions [rad or m], and the cube's centre [m].
+        configuration, goal : array_like, shapes (n_joints,) and (goal_width,)
+            Joint positions [rad or m], and the goal, at the cube's centre [m].
         trace : array_like, shape (n, 3), optional
             Where the tool has been [m].
         outcome : {"success", "collision", "truncated"}, optional
@@ -137,7 +139,7 @@ class Renderer:
         """
         n_joints = self._scene.n_joints
         configuration = finite_array("configuration", configuration, (n_joints,))
-        goal = finite_array("goal", goal, (3,))
+        goal = finite_array("goal", goal, (self.problem.task.goal.width(n_joints),))
         way = finite_array("trace", np.empty((0, 3)) if trace is None else trace, (None, 3))
         if outcome is not None and outcome not in OUTCOMES:
             raise UnknownNameError("outcome", outcome, OUTCOMES)
@@ -169,7 +171,7 @@ class Renderer:
     def _balls(self, goal: Array, contact: Contact | None) -> Array:
         """Halo of goals within tolerance, and a flash at a contact."""
         halo = self.problem.task.tolerance, *channels(CUBE.colour), HALO_OPACITY, 0.0
-        balls = [(*goal, *halo)]
+        balls = [(*goal[:3], *halo)]
         if contact is not None:
             size = self._scene.scale * FLASH_SWELL * FLASH_RADIUS
             flash = size, *channels(OUTCOME_COLOURS["collision"]), FLASH_OPACITY, 1.0
@@ -192,6 +194,7 @@ class TriangleScene:
         scene = problem.scene
         self.n_joints, self.scale = arm.n_joints, stage_scale(arm, scene)
         self._arm, self._data, self._links = arm, arm.model.createData(), link_joints(arm)
+        self._goal = problem.task.goal
         placed = scene.bodies[: len(scene.obstacles)]
         self._motions = [body.motion for body in placed if body.motion]
         frames = count(self.n_joints + 2)
@@ -201,7 +204,8 @@ class TriangleScene:
             for frame in [next(frames) if body.motion else 0]
             for finish, mesh in zip((BODY, SLAB), meshes, strict=False)
         ]
-        parts = [*standing, *arm_parts(arm), (arm.n_joints + 1, CUBE, cube_mesh(scene))]
+        marks = [(CUBE, cube_mesh(scene)), *goal_marks(self._goal)]
+        parts = [*standing, *arm_parts(arm), *((arm.n_joints + 1, *mark) for mark in marks)]
         self._arm_owners = {part[:2] for part in arm_parts(arm)}
         # Each frame has its own materials, so that a link can light up.
         owners = [(0, GROUND), *((0, finish) for finish in TRACES.values())]
@@ -263,7 +267,7 @@ class TriangleScene:
         poses[:, :, :3] = np.eye(3)
         for joint in range(1, self.n_joints + 1):
             poses[joint] = self._data.oMi[joint].homogeneous[:3]
-        poses[self.n_joints + 1, :, 3] = goal
+        poses[self.n_joints + 1] = goal_pose(self._goal, goal)[:3]
         for pose, motion in zip(poses[self.n_joints + 2 :], self._motions, strict=True):
             pose[:, 3] = motion.offsets(np.array([time]))[0]
         return poses

@@ -28,13 +28,12 @@ class ReplayStage extends Stage {
     if (this.traces[1]) {
       Object.assign(this.traces[1].material, { transparent: true, opacity: 0.5 });
     }
-    this.find("goal").position.fromArray(trial.goal);
     this.find("goal", "halo").scale.setScalar(trial.tolerance / this.data.trials[0].tolerance);
     this.start.show(trial.runs[0].states[0]);
     if (this.rival) {
       this.rival.root.visible = trial.runs.length > 1;
     }
-    const side = trial.goal[1] < 0 ? -1 : 1;
+    const side = trial.goals[0][1] < 0 ? -1 : 1;
     if (!this.touched && side !== this.side) {
       this.look(side);
     }
@@ -57,6 +56,10 @@ class ReplayStage extends Stage {
         this.traces[k].visible = at > 0;
       }
     });
+    // Goals follow each other at once, and moving ones are where they were after the last step.
+    const goal = trial.goals[Math.min(Math.floor(time), trial.goals.length - 1)];
+    this.find("goal").position.fromArray(goal);
+    this.find("goal").quaternion.fromArray(goal, 3);
     for (const [path, offsets] of Object.entries(trial.moving)) {
       const step = Math.min(Math.floor(time), Math.max(offsets.length - 2, 0));
       const [before, after] = [offsets[step], offsets[Math.min(step + 1, offsets.length - 1)]];

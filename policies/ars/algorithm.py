@@ -61,7 +61,9 @@ class ARSTraining:
             theta=theta,
             normalizer=normalizer,
             generator=dict(rng.bit_generator.state),
-            failed=FailedScenarios.none(self.simulator.arm.n_joints),
+            failed=FailedScenarios.none(
+                self.simulator.arm.n_joints, self.simulator.world.goal_width
+            ),
         )
 
     def iterate(self, state: ARSState) -> ARSState:

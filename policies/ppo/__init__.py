@@ -157,6 +157,8 @@ class PPOConfig(TrainingConfig):
             raise InvalidInputError("replay_log_std needs a replay_share above 0")
         if self.replay_noise_steps is not None and self.replay_log_std is None:
             raise InvalidInputError("replay_noise_steps needs a replay_log_std")
+        if self.stop_at_goal and not self.problem.task.goal.plain:
+            raise InvalidInputError("stop_at_goal is for standing points: give goals a hold of 2")
         if self.batch_size == 1 or self.steps_per_iteration % self.batch_size:
             raise InvalidInputError(
                 f"batch_size must be above 1 and divide the {self.steps_per_iteration} steps of a "
@@ -233,14 +235,17 @@ class EpisodeStates(NamedTuple):
     ----------
     q, start : ndarray, shape (n, n_joints)
         Current and first configurations [rad or m].
-    goal : ndarray, shape (n, 3)
-        Goal positions [m].
+    goal : ndarray, shape (n, goal_width)
+        First goals [m].
     steps, total : ndarray, shape (n,)
         Steps taken, and sums of rewards so far.
     replayed : ndarray of bool, shape (n,)
         Whether they began where an earlier one had failed.
     drive : ndarray, shape (n, n_rows, n_actions), or empty
         States of their plants.
+    done : ndarray of int, shape (n, 2) or (0, 2)
+        Goals reached, and steps in a row that the present one is kept, of goals
+        beyond standing points.
     """
 
     q: NDArray[np.float64]
@@ -250,6 +255,7 @@ class EpisodeStates(NamedTuple):
     start: NDArray[np.float64]
     replayed: NDArray[np.bool_]
     drive: NDArray[np.float64] = np.zeros((0, 0, 0))
+    done: NDArray[np.int64] = np.zeros((0, 2), dtype=np.int64)
 
     @classmethod
     def begun(cls, starts: NDArray[np.float64], goals: NDArray[np.float64]) -> "EpisodeStates":

@@ -73,8 +73,9 @@ class TrainingArms:
         self.reach_within(config.tolerance_at(done))
         begun = EpisodeStates._make(map(np.copy, state.episodes))
         scenarios, start, taken = (begun.q, begun.goal), begun.start, begun.steps
+        kept = begun.done.T if len(begun.done) else None
         self.episodes = self.simulator.reset(
-            *scenarios, origins=start, taken=taken, drive=begun.drive
+            *scenarios, origins=start, taken=taken, drive=begun.drive, done=kept
         )
         self._total, self._start, self._replayed = begun.total, begun.start, begun.replayed
         self.failed, self.time = state.failed, 0.0
@@ -86,7 +87,9 @@ class TrainingArms:
     def states(self) -> EpisodeStates:
         """Copy the state of running episodes."""
         episodes, ours = self.episodes, (self._total, self._start, self._replayed)
-        parts = (episodes.q, episodes.goal, episodes.steps, *ours, episodes.drive)
+        done = np.stack([episodes.pursuit.goals_reached, episodes.pursuit.held], axis=1)
+        begun = (episodes.q, episodes.first_goals, episodes.steps)
+        parts = (*begun, *ours, episodes.drive, done)
         return EpisodeStates._make(map(np.copy, parts))
 
     def observe(self) -> Numbers:
@@ -133,7 +136,7 @@ class TrainingArms:
         """Replace episodes; missed ones may be replayed."""
         config, episodes = self.config, self.episodes
         if config.replay_share:
-            scenarios = self._start[missed], episodes.goal[missed]
+            scenarios = self._start[missed], episodes.first_goals[missed]
             self.failed = self.failed.followed_by(*scenarios, config.replay_size)
 
         def draw(places: NDArray[np.int64]) -> StartsAndGoals:

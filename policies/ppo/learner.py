@@ -89,7 +89,7 @@ class PPOTraining:
             second_moment=np.zeros_like(parameters),
             normalizer=normalizer,
             episodes=EpisodeStates.begun(starts, goals),
-            failed=FailedScenarios.none(arms.simulator.arm.n_joints),
+            failed=FailedScenarios.none(starts.shape[1], goals.shape[1]),
         )
         if not config.demonstrations:
             return state

@@ -70,7 +70,9 @@ class SB3VecEnv(Lifecycle, VecEnv):
         self._share = replay_share
         self._size = whole_number("replay_size", replay_size, 1, LARGEST_REPLAY)
         self._chooser = np.random.default_rng()
-        self._failed = self._restored = FailedScenarios.none(simulator.arm.n_joints)
+        self._failed = self._restored = FailedScenarios.none(
+            simulator.arm.n_joints, simulator.world.goal_width
+        )
         self._starts = np.empty((num_envs, simulator.arm.n_joints))
         self._replayed = np.zeros(num_envs, dtype=bool)
         self._returns = np.zeros(num_envs)
@@ -89,14 +91,14 @@ class SB3VecEnv(Lifecycle, VecEnv):
 
         Parameters
         ----------
-        starts, goals : array_like, shape (n, n_joints) and (n, 3)
-            Configurations [rad or m] and positions [m], oldest first; the last
+        starts, goals : array_like, shape (n, n_joints) and (n, goal_width)
+            Configurations [rad or m] and goals [m], oldest first; the last
             ``replay_size`` are kept.
         """
         if not self._share:
             raise InvalidInputError("failed scenarios need an environment with a replay_share")
         checked, size = self.simulator.reset(starts, goals), self._size
-        self._failed = FailedScenarios(checked.q[-size:], checked.goal[-size:])
+        self._failed = FailedScenarios(checked.q[-size:], checked.first_goals[-size:])
         self._restored = self._failed
 
     def reset(self) -> Observations:
@@ -138,7 +140,8 @@ class SB3VecEnv(Lifecycle, VecEnv):
         """Starts and goals of the next episodes."""
 
         def draw_new(new: NDArray[np.int64]) -> StartsAndGoals:
-            starts, goals = np.empty(self._starts.shape), np.empty((self.num_envs, 3))
+            width = self.simulator.world.goal_width
+            starts, goals = np.empty(self._starts.shape), np.empty((self.num_envs, width))
             self._queues.put(rows[new], starts, goals)
             return starts[rows[new]], goals[rows[new]]
 
@@ -175,6 +178,7 @@ class SB3VecEnv(Lifecycle, VecEnv):
                 "is_success": result.success,
                 "collision": result.collision,
                 "distance": episodes.distance,
+                **result.told,
             }
             if self._share:
                 columns["replayed"] = self._replayed
@@ -196,7 +200,7 @@ class SB3VecEnv(Lifecycle, VecEnv):
         """Replace episodes that ended."""
         if self._share:
             failed = rows[episodes.status[rows] != SUCCESS]
-            scenarios = self._starts[failed], episodes.goal[failed]
+            scenarios = self._starts[failed], episodes.first_goals[failed]
             self._failed = self._failed.followed_by(*scenarios, self._size)
         self._starts[rows], episodes.goal[rows] = self._draw(rows)
         episodes.q[rows] = self._starts[rows]

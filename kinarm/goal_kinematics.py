@@ -1,0 +1,187 @@
+"""What goals mean for an arm: where they lie, and which configurations reach them."""
+
+import math
+from functools import cached_property
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import ArrayLike, NDArray
+
+from kinarm.bodies import rotation_matrix, rotation_of_quaternion
+from kinarm.chain import within_limits
+from kinarm.collision import ContactModel
+from kinarm.errors import ProblemError, finite_array
+from kinarm.goals import Cone, Goals, quaternion_between, unit
+from kinarm.inverse_kinematics import InverseKinematics, approach_axis
+from kinarm.kernels.compiling import Array
+from kinarm.kernels.goals import GoalRules, fill_reached
+from kinarm.kernels.kinematics import POSE
+from kinarm.kernels.records import recorded
+from kinarm.problem import ReachProblem
+
+SOLUTIONS = (4, 64)
+"""Configurations at a goal that are tried in turn."""
+
+SAMPLE = 64
+"""Goals that show whether an arm reaches any."""
+
+
+class GoalKinematics(InverseKinematics):
+    """Goals of a problem, for its arm."""
+
+    problem: ReachProblem
+    contact_model: ContactModel
+
+    def checked(self, what: str, listed: tuple[tuple[float, ...], ...]) -> Array:
+        """Listed configurations, shape (n, n_joints), if all are possible [rad or m]."""
+        arm, configurations = self.arm, np.empty((len(listed), self.arm.n_joints))
+        for number, configuration in enumerate(listed):
+            name = f"{what}[{number}]"
+            given = finite_array(name, configuration, (arm.n_joints,))
+            configurations[number] = within_limits(name, given, arm.chain, arm.joint_names)
+            pair = self.contact_model.contact_pair(configurations[number])
+            if pair is not None:
+                raise ProblemError(f"{name} is in contact: {pair[0]} touches {pair[1]}")
+        return configurations
+
+    def goal_rules(self) -> GoalRules:
+        """What is to be reached, and how, for the kernels."""
+        task, dt = self.problem.task, self.problem.stepping.time_step
+        goal, times = task.goal, np.arange(task.horizon + 1, dtype=np.float64) * dt
+        x, y, z, w = pin.Quaternion(self.tool.placement[:3, :3]).coeffs()
+        return GoalRules(
+            kind=goal.number,
+            hold=goal.hold,
+            sequence=goal.sequence,
+            wander=goal.wander or 0,
+            tolerance=goal.rotation_tolerance,
+            stride=float("inf") if goal.speed is None else goal.speed * dt,
+            axis=approach_axis(self.arm),
+            frame=np.array([w, x, y, z]),
+            moves=goal.motion.offsets(times) if goal.motion else np.zeros((0, 3)),
+        )
+
+    @cached_property
+    def goal_width(self) -> int:
+        """Length of a goal."""
+        return self.problem.task.goal.width(self.arm.n_joints)
+
+    @property
+    def goal_bounds(self) -> tuple[Array, Array]:
+        """Lowest and highest positions of goals, shape (3,) each [m]."""
+        if self.problem.task.goal.configurations:
+            return self.goals.lower.min(axis=0), self.goals.lower.max(axis=0)
+        scene, moves = self.problem.scene, self.goal_rules().moves
+        regions = [scene.goal_region(name) for name in self.problem.task.goal_regions]
+        lower = np.min([region.lower for region in regions], axis=0)
+        upper = np.max([region.upper for region in regions], axis=0)
+        if len(moves):
+            return lower + moves.min(axis=0), upper + moves.max(axis=0)
+        return lower, upper
+
+    @cached_property
+    def goals(self) -> Goals:
+        """Where the task's goals lie."""
+        goal = self.problem.task.goal
+        goals = self.problem.task.goals_in(self.problem.scene)
+        if goal.kind == "position":
+            return goals
+        unknown = np.full((1, self.goal_width - 3), np.nan)
+        if goal.configurations:
+            rests = self.reached(self.checked("task.goal.configurations", goal.configurations))
+            n = len(rests)
+            none, ends = np.zeros(0, dtype=np.int64), np.arange(1, n) / n
+            return Goals(rests[:, :3], np.zeros((n, 0)), none, ends, rests[:, 3:])
+        axis = (self.tool.placement[:3, :3] * approach_axis(self.arm)[:, None]).sum(axis=0)
+        if goal.axis is not None:
+            along = unit(np.array(goal.axis))
+            turned = along if goal.kind == "direction" else quaternion_between(axis, along)
+            cone = Cone(along, axis, 1.0 - round(math.cos(goal.angle), 12))
+            return goals.with_rests(turned[None])._replace(cone=cone)
+        turns = [rotation_matrix(rpy) for rpy in goal.rotations]
+        if goal.kind == "direction":
+            listed = [unit((turn * axis).sum(axis=1)) for turn in turns]
+        else:
+            listed = [unit(np.roll(pin.Quaternion(turn).coeffs(), 1)) for turn in turns]
+        return goals.with_rests(np.array(listed) if listed else unknown)
+
+    def configurations_at(self, goals: Array, most: int) -> tuple[Array, NDArray[np.int64]]:
+        """Configurations at goals, shape (m, n_joints) [rad or m], and the goal of each.
+
+        Only actuated joints move. Where none is exact, errors may be as large as the tolerances.
+
+        Parameters
+        ----------
+        goals : ndarray, shape (n, goal_width)
+            Goals, all with a rest or none, which is NaN.
+        most : int
+            Largest number for a goal.
+        """
+        task, rests = self.problem.task, goals[:, 3:]
+        positions, goal = np.ascontiguousarray(goals[:, :3]), task.goal
+        if goal.kind == "position" or np.isnan(rests).any():
+            solutions = self.inverse_kinematics(positions, most=most)
+            return solutions.configurations, solutions.owner
+        if goal.kind == "configuration":
+            return np.ascontiguousarray(rests), np.arange(len(goals))
+        poses = np.tile(np.eye(4), (len(goals), 1, 1))
+        if goal.kind == "pose":
+            poses[:, :3, 3] = positions
+            for pose, (w, x, y, z) in zip(poses, rests.tolist(), strict=True):
+                pose[:3, :3] = rotation_of_quaternion((w, x, y, z))
+        solutions = self.inverse_kinematics(
+            poses if goal.kind == "pose" else positions,
+            None if goal.kind == "pose" else rests,
+            joints=self.arm.n_actuated,
+            most=most,
+            position_tolerance=task.tolerance,
+            rotation_tolerance=goal.rotation_tolerance,
+        )
+        return solutions.configurations, solutions.owner
+
+    def solved_goals(
+        self, goals: Array, choices: Array, scenes: Array
+    ) -> tuple[NDArray[np.bool_], Array]:
+        """Which goals have a configuration without contact; and goals with its rests.
+
+        Parameters
+        ----------
+        goals : ndarray, shape (n, goal_width)
+            Goals; unknown rests become those of a configuration that is found.
+        choices : ndarray, shape (n,)
+            Numbers in [0, 1) that choose it.
+        scenes : ndarray
+            As of `kinarm.World.scenes_of`.
+        """
+        filled, found = goals.copy(), np.zeros(len(goals), dtype=bool)
+        unknown = np.isnan(goals[:, 3:]).sum(axis=1) > 0
+        for most in SOLUTIONS:
+            rows = np.flatnonzero(~found)
+            q, owner = self.configurations_at(goals[rows], most)
+            owner = rows[owner]
+            free = ~self.screened(q, scenes[owner] if len(scenes) else scenes)[1]
+            rows, first, counts = np.unique(owner[free], return_index=True, return_counts=True)
+            found[rows] = True
+            wanted = unknown[rows]
+            chosen = (first + (choices[rows] * counts).astype(np.int64))[wanted]
+            filled[rows[wanted], 3:] = self.reached(q[free][chosen])[:, 3:]
+        return found, filled
+
+    @cached_property
+    def reachable_of_sample(self) -> int:
+        """Of how many of `SAMPLE` goals a configuration is found, with nothing random around."""
+        goals = self.goals.draw(np.random.default_rng(0), SAMPLE)
+        nothing = np.zeros((0, *self.contact_model.shapes.placed.shape))
+        return int(self.solved_goals(goals, np.zeros(SAMPLE), nothing)[0].sum())
+
+    def reached(self, configurations: ArrayLike) -> Array:
+        """What the tool reaches at configurations, as goals are, shape (n, goal_width)."""
+        q = finite_array("configurations", configurations, (None, self.arm.n_joints))
+        rows, poses = np.empty((len(q), self.goal_width)), np.empty((q.shape[1] + 1, POSE))
+        chain, goal = recorded(self.arm.chain), recorded(self.goal_rules())
+        fill_reached(chain, goal, q, poses, rows)
+        return rows
+
+    def screened(self, q: Array, scenes: Array | None = None) -> tuple[Array, NDArray[np.bool_]]:
+        """Tool points of configurations, and which touch something, as `kinarm.World` tells."""
+        raise NotImplementedError

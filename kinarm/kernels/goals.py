@@ -1,0 +1,155 @@
+"""Goals beyond standing points: errors of rotation, arriving, and the next goal.
+
+A row of a goal is a position and a rest: nothing, a direction, a quaternion or a configuration
+(`kinarm.goals`). What the tool has reached is such a row, too.
+"""
+
+import math
+from typing import NamedTuple
+
+from kinarm.chain import Chain
+from kinarm.kernels.compiling import Array, Vector, inlined, lean_kernel
+from kinarm.kernels.elementary import angle_of, sine_cosine
+from kinarm.kernels.kinematics import forward_kinematics, rotated, to_world
+from kinarm.kernels.lanes import select
+
+POSITION, DIRECTION, POSE, CONFIGURATION = range(4)
+"""Kinds of goals."""
+
+TURN = 6.283185307179586
+"""A whole turn [rad]."""
+
+
+class GoalRules(NamedTuple):
+    """What is to be reached, and how, for the kernels.
+
+    Attributes
+    ----------
+    kind, hold, sequence, wander : int
+        Kind of the goals; steps in a row that a goal is to be kept; goals of an episode;
+        and steps of a walk to the next goal, 0 if goals do not wander.
+    tolerance : float
+        Error of the rest at which it counts as reached [rad, or rad or m].
+    stride : float
+        Largest move of the tool in the step that reaches a goal [m].
+    axis : ndarray, shape (3,)
+        Direction of the tool's axis in the last joint frame.
+    frame : ndarray, shape (4,)
+        Orientation of the tool frame in the last joint frame: quaternion w x y z.
+    moves : ndarray, shape (horizon + 1, 3) or (0, 3)
+        Offset of moving goals after each step [m].
+    """
+
+    kind: int
+    hold: int
+    sequence: int
+    wander: int
+    tolerance: float
+    stride: float
+    axis: Array
+    frame: Array
+    moves: Array
+
+
+@inlined
+def write_reached(
+    goal: GoalRules, tool: Vector, poses: Array, q: Array, rows: Array, row: int
+) -> None:
+    """Write what the tool has reached as a row of a goal.
+
+    Parameters
+    ----------
+    goal, tool
+        The rules, and the tool point [m].
+    poses, q : ndarray, shape (n_frames, POSE) and (n, n_joints)
+        Frames of the joints at a row of the configurations.
+    rows, row
+        Where it goes, and the row.
+    """
+    rows[row, 0], rows[row, 1], rows[row, 2] = tool
+    last, axis, frame = q.shape[1], goal.axis, goal.frame
+    if goal.kind == DIRECTION:
+        rows[row, 3], rows[row, 4], rows[row, 5] = rotated(poses, last, axis[0], axis[1], axis[2])
+    elif goal.kind == POSE:
+        pw, px, py, pz = poses[last, 0], poses[last, 1], poses[last, 2], poses[last, 3]
+        w, x, y, z = frame[0], frame[1], frame[2], frame[3]
+        rows[row, 3] = pw * w - px * x - py * y - pz * z
+        rows[row, 4] = pw * x + px * w + py * z - pz * y
+        rows[row, 5] = pw * y - px * z + py * w + pz * x
+        rows[row, 6] = pw * z + px * y - py * x + pz * w
+    elif goal.kind == CONFIGURATION:
+        for joint in range(q.shape[1]):
+            rows[row, 3 + joint] = q[row, joint]
+
+
+@inlined
+def nearer_sign(kind: int, reached: Array, r: int, wanted: Array, w: int) -> float:
+    """Sign of the reached quaternion that is nearer to the wanted one; 1 for other rests."""
+    sign = 1.0
+    if kind == POSE:
+        same = reached[r, 3] * wanted[w, 3] + reached[r, 4] * wanted[w, 4]
+        same += reached[r, 5] * wanted[w, 5] + reached[r, 6] * wanted[w, 6]
+        sign = select(same < 0.0, -1.0, 1.0)
+    return sign
+
+
+@inlined
+def turn_between(kind: int, reached: Array, r: int, wanted: Array, w: int) -> float:
+    """Angle between two rows' directions or rotations, or their largest difference of a joint.
+
+    It is in [rad], or [m] for a sliding joint.
+    """
+    turn = 0.0
+    if kind == DIRECTION:
+        ax, ay, az = reached[r, 3], reached[r, 4], reached[r, 5]
+        bx, by, bz = wanted[w, 3], wanted[w, 4], wanted[w, 5]
+        x, y, z = ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx
+        turn = angle_of(math.sqrt(x * x + y * y + z * z), ax * bx + ay * by + az * bz)
+    elif kind == POSE:
+        aw, ax, ay, az = reached[r, 3], reached[r, 4], reached[r, 5], reached[r, 6]
+        bw, bx, by, bz = wanted[w, 3], wanted[w, 4], wanted[w, 5], wanted[w, 6]
+        cosine = abs(aw * bw + ax * bx + ay * by + az * bz)
+        x = aw * bx - ax * bw - ay * bz + az * by
+        y = aw * by + ax * bz - ay * bw - az * bx
+        z = aw * bz - ax * by + ay * bx - az * bw
+        turn = 2.0 * angle_of(math.sqrt(x * x + y * y + z * z), cosine)
+    elif kind == CONFIGURATION:
+        for i in range(3, wanted.shape[1]):
+            turn = max(turn, abs(reached[r, i] - wanted[w, i]))
+    return turn
+
+
+@lean_kernel
+def fill_reached(chain: Chain, goal: GoalRules, q: Array, poses: Array, rows: Array) -> None:
+    """Fill in what is reached at configurations, as rows of goals.
+
+    Parameters
+    ----------
+    chain, goal, q
+        The arm, the rules, and configurations, shape (n, n_joints).
+    poses, rows : ndarray, shape (n_joints + 1, POSE) and (n, goal_width)
+        Work space, and where it goes.
+    """
+    for e in range(q.shape[0]):
+        forward_kinematics(chain, q, e, poses)
+        tool = to_world(poses, q.shape[1], chain.tool[0], chain.tool[1], chain.tool[2])
+        write_reached(goal, tool, poses, q, rows, e)
+
+
+@lean_kernel
+def errors_between(
+    kind: int, reached: Array, wanted: Array, distances: Array, turns: Array
+) -> None:
+    """Fill in distances [m] and turns of rows of goals, shape (n, width), from what is reached."""
+    for row in range(reached.shape[0]):
+        x, y = reached[row, 0] - wanted[row, 0], reached[row, 1] - wanted[row, 1]
+        z = reached[row, 2] - wanted[row, 2]
+        distances[row] = math.sqrt(x * x + y * y + z * z)
+        turns[row] = turn_between(kind, reached, row, wanted, row)
+
+
+@lean_kernel
+def circle_points(shares: Array, cosines: Array, sines: Array) -> None:
+    """Fill in cosines and sines of shares of a whole turn, shape (n,)."""
+    for row in range(len(shares)):
+        sines[row], cosines[row] = sine_cosine(TURN * shares[row])

@@ -1,0 +1,178 @@
+"""Goals beyond standing points, beside the reference, for each kind and way of arriving."""
+
+import itertools
+
+import numba
+import numpy as np
+import pytest
+
+from kinarm.errors import KinarmError
+from kinarm.kernels.elementary import angle_of
+from kinarm.problem import ReachProblem
+from kinarm.reference import ReferenceSimulator
+from kinarm.scenarios import draw_followers
+from kinarm.simulator import Simulator
+
+N, HORIZON = 24, 64
+
+KINDS = {
+    "position": {},
+    "direction": {"kind": "direction", "axis": (0.0, 0.0, -1.0), "angle": 0.9},
+    "pose": {"kind": "pose"},
+    "configuration": {"kind": "configuration"},
+}
+
+WAYS = {
+    "touched": {},
+    "held": {"hold": 3, "speed": 0.2},
+    "sequence": {"sequence": 3},
+    "held sequence": {"sequence": 2, "hold": 2},
+    "moving": {"motion": {"waypoints": [[0.3, 0.0, 0.05, 0.02], [0.6, 0.0, 0.0, 0.0]]}},
+    "moving sequence": {"sequence": 2, "motion": {"velocity": [0.0, 0.05, 0.0]}},
+    "wandering": {"wander": 20},
+}
+
+CASES = [
+    pytest.param({**KINDS[kind], **WAYS[way]}, id=f"{kind}, {way}")
+    for kind, way in itertools.product(KINDS, WAYS)
+    if kind != "configuration" or way not in ("moving", "moving sequence", "wandering")
+]
+
+
+def simulator_of(goal, **settings):
+    reward = {"progress": 2.0, "closer": 0.125, "step": -0.25, "collision": -3.0, "success": 5.0}
+    if goal.get("kind"):
+        reward["rotation"] = 0.3
+    settings = {"horizon": HORIZON, "tolerance": 0.04, "reachable_goals": True, **settings}
+    problem = ReachProblem.load("both").replace(goal=goal, reward=reward, **settings)
+    return Simulator(problem, threads=1)
+
+
+def actions_to(simulator, starts, goals):
+    """Straight ways from goal to goal, with rests, as actions, shape (n, HORIZON, n_actions)."""
+    world, task = simulator.world, simulator.task
+    actions = np.zeros((len(starts), task.horizon, simulator.n_actions))
+    in_turn = goals[:, None]
+    if task.goal.changes:
+        in_turn = draw_followers(world, starts, goals)
+    for e, (start, wanted) in enumerate(zip(starts, in_turn, strict=True)):
+        q, way = start[:5], []
+        for goal in wanted:
+            found, _ = world.configurations_at(goal[None], 16)
+            if not len(found):
+                break
+            end = found[np.abs(found[:, :5] - q).max(axis=1).argmin(), :5]
+            steps = max(1, int(np.ceil((np.abs(end - q) / simulator.step_limit).max())))
+            way += [(end - q) / steps / simulator.step_limit] * steps
+            way += [np.zeros(5)] * task.goal.hold
+            q = end
+        way = np.array(way[: task.horizon]).reshape(-1, 5)
+        actions[e, : len(way)] = way
+    return actions
+
+
+@pytest.mark.parametrize("goal", CASES)
+def test_the_reference_agrees(goal):
+    compare_with_reference(simulator_of(goal))
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_the_reference_agrees_with_a_plant(kind):
+    # Policies see what is measured, and are judged by what is.
+    compare_with_reference(simulator_of({**KINDS[kind], "sequence": 2}, plant="ur", tolerance=0.1))
+
+
+def compare_with_reference(simulator):
+    starts, goals = simulator.sample(np.random.default_rng(5), N)
+    actions = actions_to(simulator, starts, goals)
+    rollouts = simulator.rollout_actions(actions, starts, goals, record=True)
+    reference = ReferenceSimulator(simulator)
+    episodes = simulator.reset(starts, goals)
+    seen = [episodes.observation.copy()]
+    told = []
+    for step in range(HORIZON):
+        told.append(simulator.step(episodes, actions[:, step]))
+        seen.append(episodes.observation.copy())
+    assert rollouts.success.any() or simulator.task.goal.wander
+    for e in range(N):
+        table = iter(actions[e])
+        expected = reference.rollout(lambda _, table=table: next(table), starts[e], goals[e])
+        steps = len(expected.rewards)
+        ended = rollouts.success[e], rollouts.collision[e], rollouts.steps[e]
+        assert ended == (expected.success, expected.collision, steps)
+        close = {"rtol": 0, "atol": 1e-12}
+        np.testing.assert_allclose(rollouts.paths[e, : steps + 1], expected.path, **close)
+        own = [seen[k][e] for k in range(steps + 1)]
+        np.testing.assert_allclose(own, expected.observations, **close)
+        rewards = [told[k].reward[e] for k in range(steps)]
+        np.testing.assert_allclose(rewards, expected.rewards, **close)
+        np.testing.assert_allclose(rollouts.returns[e], expected.rewards.sum(), atol=1e-11)
+        np.testing.assert_allclose(rollouts.distance[e], expected.distance, **close)
+        if "turn" in simulator.task.goal.told:
+            np.testing.assert_allclose(rollouts.turn[e], expected.turn, rtol=0, atol=1e-7)
+            np.testing.assert_allclose(told[steps - 1].told["turn"][e], expected.turn, atol=1e-7)
+        if "goals_reached" in simulator.task.goal.told:
+            assert rollouts.goals_reached[e] == expected.goals_reached
+            assert told[steps - 1].told["goals_reached"][e] == expected.goals_reached
+
+
+@pytest.mark.parametrize("goal", [CASES[k].values[0] for k in (2, 10, 20)])
+def test_threads_and_batches_do_not_matter(goal):
+    simulator = simulator_of(goal)
+    starts, goals = simulator.sample(np.random.default_rng(5), N)
+    actions = actions_to(simulator, starts, goals)
+    whole = simulator.rollout_actions(actions, starts, goals, record=True)
+    for rows in (slice(0, 1), slice(3, 17), np.arange(N)[::-1]):
+        part = simulator.rollout_actions(actions[rows], starts[rows], goals[rows], record=True)
+        for name in ("success", "steps", "distance", "returns", "turn", "goals_reached", "goals"):
+            first = getattr(whole, name)
+            np.testing.assert_array_equal(first[rows] if len(first) else first, getattr(part, name))
+        np.testing.assert_array_equal(whole.goal_paths[rows], part.goal_paths)
+
+
+@numba.njit
+def angles(sines, cosines, filled):
+    for i in range(len(sines)):
+        filled[i] = angle_of(sines[i], cosines[i])
+
+
+def test_angles_beside_numpy():
+    wide = np.linspace(0.0, np.pi, 200_001)
+    small = np.array([0.0, 1e-300, 1e-160, 1e-17, 1e-9, np.pi - 1e-9, np.pi])
+    angle = np.concatenate([wide, small])
+    sines, cosines = np.maximum(np.sin(angle), 0.0) * 3.0, np.cos(angle) * 3.0
+    filled = np.empty(len(angle))
+    angles(sines, cosines, filled)
+    np.testing.assert_allclose(filled, np.arctan2(sines, cosines), rtol=4e-16, atol=0)
+
+
+@pytest.mark.parametrize(
+    ("goal", "message"),
+    [
+        ({"kind": "posture"}, "kind must be one of position, direction, pose, configuration"),
+        ({"hold": 0}, "hold must be a whole number of at least 1, got 0"),
+        ({"rotation_tolerance": 0.0}, "rotation_tolerance must be greater than 0"),
+        ({"speed": 0.0}, "speed must be greater than 0"),
+        ({"rotations": [[0, 0, 0]]}, "position has no rotations or axis"),
+        ({"kind": "pose", "angle": 0.3}, "needs an axis for its angle"),
+        ({"kind": "pose", "axis": [0, 0, 0]}, "has an axis of 0, 0, 0"),
+        ({"kind": "pose", "configurations": [[0] * 6]}, "pose has no configurations"),
+        ({"kind": "configuration", "wander": 5}, "configuration does not move"),
+        ({"sequence": 2, "wander": 5}, "has wander or sequence > 1, not both"),
+        (
+            {"kind": "configuration", "sequence": 2, "configurations": [[0] * 6]},
+            "sequence of 2 needs two configurations or more",
+        ),
+    ],
+)
+def test_bad_goals_are_refused_in_a_line(goal, message):
+    with pytest.raises(KinarmError, match=message) as error:
+        ReachProblem.load("right").replace(goal=goal)
+    assert "\n" not in str(error.value)
+
+
+def test_rotations_that_an_arm_lacks_are_refused():
+    # Five joints do not turn the tool about the axis of its last one.
+    goal = {"kind": "pose", "rotations": [[0.0, 0.0, 1.0]], "rotation_tolerance": 1e-4}
+    with pytest.raises(KinarmError, match="0 of a sample of 64 goals can be reached: arm"):
+        simulator_of(goal).sample(np.random.default_rng(0), 1)
