@@ -19,6 +19,15 @@ from kinarm.errors import POSITIVE, ProblemError
 KINDS = ("position", "direction", "pose", "configuration")
 """Kinds of goals, by their numbers in `kinarm.kernels.goals`."""
 
+REST_PARTS = {
+    "direction": ("goal_direction", "direction_error"),
+    "pose": ("goal_rotation", "rotation_error"),
+    "configuration": ("goal_joints", "joints_error"),
+}
+"""Parts of the rests of goals, and of their errors, by the kind of the goals."""
+
+GOAL_RESTS, REST_ERRORS = zip(*REST_PARTS.values(), strict=True)
+
 ANGLE = {"must": "lie in [0, pi]", "holds": lambda value: 0 <= value <= math.pi}
 
 Point = tuple[float, float, float]

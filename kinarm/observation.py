@@ -10,13 +10,13 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from kinarm.errors import LARGEST
+from kinarm.goals import REST_PARTS
 from kinarm.kernels.compiling import Array, inlined
 from kinarm.kernels.elementary import sine_cosine
 from kinarm.kernels.goals import nearer_sign, write_reached
 from kinarm.kernels.plant import COMMAND
 from kinarm.kernels.session import Session
 from kinarm.kernels.surroundings import NEAR, Seen, write_obstacles, write_proximity
-from kinarm.observation_choice import REST_PARTS
 from kinarm.scene import Scene
 
 if TYPE_CHECKING:

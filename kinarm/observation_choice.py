@@ -6,18 +6,10 @@ from typing import Any, cast
 
 from kinarm._fields import OPTIONAL, Checked, init_fields
 from kinarm.errors import ProblemError, UnknownNameError
+from kinarm.goals import GOAL_RESTS, REST_ERRORS, REST_PARTS
 
 PAPER_PARTS = ("goal", "goal_minus_tool", "orientation", "position")
 """The paper's observation (section 3.2)."""
-
-REST_PARTS = {
-    "direction": ("goal_direction", "direction_error"),
-    "pose": ("goal_rotation", "rotation_error"),
-    "configuration": ("goal_joints", "joints_error"),
-}
-"""Parts of the rests of goals, and of their errors, by the kind of the goals."""
-
-GOAL_RESTS, REST_ERRORS = zip(*REST_PARTS.values(), strict=True)
 
 LONGEST_HISTORY, MOST_SLOTS = 32, 32
 

@@ -8,9 +8,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from kinarm.arm import Arm
 from kinarm.errors import InvalidInputError, ProblemError
+from kinarm.goals import REST_PARTS
 from kinarm.kernels.compiling import Array
 from kinarm.observation import ACTUATED, JOINTS, OBSERVATION, ONCE, SLOTS, VERSION, Part, Ranges
-from kinarm.observation_choice import REST_PARTS
 from kinarm.problem import ReachProblem
 
 

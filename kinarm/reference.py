@@ -15,10 +15,10 @@ from numpy.typing import ArrayLike
 from kinarm.arm import Arm
 from kinarm.contact_pairs import make_verdicts_reliable, start_anew
 from kinarm.errors import LARGEST
+from kinarm.goals import GOAL_RESTS, REST_ERRORS
 from kinarm.inverse_kinematics import approach_axis
 from kinarm.kernels.compiling import Array
 from kinarm.observation import SLOTS
-from kinarm.observation_choice import GOAL_RESTS, REST_ERRORS
 from kinarm.reference_plant import ReferencePlant
 from kinarm.scenarios import draw_followers
 from kinarm.simulator import Simulator

@@ -20,8 +20,8 @@ from kinarm.envs.reach import ReachEnv
 from kinarm.envs.vector import ReachVectorEnv
 from kinarm.episodes import TRUNCATED, Episodes, StepResult
 from kinarm.errors import InvalidInputError
+from kinarm.goals import REST_PARTS
 from kinarm.kernels.goals import errors_between
-from kinarm.observation_choice import REST_PARTS
 from kinarm.simulator import Simulator
 
 RewardType = Literal["sparse", "dense"]
