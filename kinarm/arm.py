@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 from kinarm._files import first_line
 from kinarm.arm_specification import AllowedContact, ArmSpecification
 from kinarm.bodies import HeldBody
-from kinarm.chain import Chain, link_lengths, within_limits
+from kinarm.chain import Chain, length_of, link_lengths, within_limits
 from kinarm.errors import ArmError, finite_array
 from kinarm.meshes import coal_shape, hulls_of_mesh
 from kinarm.urdf import Description, read_urdf
@@ -187,7 +187,7 @@ class Arm:
     @property
     def reach(self) -> float:
         """Bound on the distance from the world's origin to the tool point [m]."""
-        return float(link_lengths(self.chain).sum() + np.linalg.norm(self.chain.tool))
+        return float(link_lengths(self.chain).sum() + length_of(self.chain.tool))
 
     @cached_property
     def digest(self) -> str:

@@ -147,8 +147,13 @@ class MotionBounds(NamedTuple):
             ]
         )
         lengths = link_lengths(chain)
-        outward = np.append(np.cumsum(lengths[::-1])[::-1][1:], 0.0) + np.linalg.norm(chain.tool)
+        outward = np.append(np.cumsum(lengths[::-1])[::-1][1:], 0.0) + length_of(chain.tool)
         return cls(curvature, swing, outward[:n].copy())
+
+
+def length_of(vector: NDArray[np.float64]) -> float:
+    """Length of a vector, without BLAS, of which `numpy.linalg.norm` would ask it."""
+    return float(np.sqrt(np.square(vector).sum()))
 
 
 def link_lengths(chain: Chain) -> NDArray[np.float64]:
@@ -179,8 +184,8 @@ def point_speed(chain: Chain, axis: int, link: int, points: NDArray[np.float64])
     if link == axis + 1:
         return float(np.linalg.norm(np.cross(chain.axis[axis], points), axis=1).max())
     following, lengths = chain.translation[axis + 1], link_lengths(chain)
-    slide = lengths[axis + 1] - np.linalg.norm(following)
-    offset = np.linalg.norm(np.cross(chain.axis[axis], following)) + slide
+    slide = lengths[axis + 1] - length_of(following)
+    offset = length_of(np.cross(chain.axis[axis], following)) + slide
     between = lengths[axis + 2 : link].sum()
     return float(offset + between + np.linalg.norm(points, axis=1).max())
 
