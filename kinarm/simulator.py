@@ -239,7 +239,13 @@ class Simulator:
         return rollouts
 
     def rollout_actions(
-        self, actions: ArrayLike, starts: ArrayLike, goals: ArrayLike, *, record: bool = False
+        self,
+        actions: ArrayLike,
+        starts: ArrayLike,
+        goals: ArrayLike,
+        *,
+        record: bool = False,
+        taken: NDArray[np.int64] | int = 0,
     ) -> Rollouts:
         """Run whole episodes on given actions.
 
@@ -247,12 +253,13 @@ class Simulator:
         ----------
         actions : array_like, shape (n, horizon, n_actions)
             Fractions of the velocity limits, clipped to [-1, 1].
-        starts, goals, record
-            As for `reset`.
+        starts, goals, record, taken
+            As for `reset`; of actions, those of steps taken before are left out.
         """
         q, goal = self.world.check_scenarios(starts, goals)
         table = finite_array("actions", actions, (len(q), self.task.horizon, self.n_actions))
         episodes = self.world.episodes(q, goal, record=record)
+        episodes.steps[:] = taken
         session = self.world.session(Control(actions=table), episodes)
         return Rollouts.from_episodes(q, self._run(session))
 

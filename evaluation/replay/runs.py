@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from kinarm.evaluation.contestants import Contestant
 from kinarm.evaluation.trials import TrialSet
-from kinarm.policies.oracle.oracle import OracleSolutions
+from kinarm.policies.oracle.solutions import OracleSolutions
 from kinarm.policies.provenance import package_versions, source_commit
 from kinarm.recording import Recording, record_rollouts
 from kinarm.simulator import Simulator

@@ -8,8 +8,12 @@ from numpy.typing import NDArray
 from kinarm._parallel import run_rows
 from kinarm.chain import MotionBounds
 from kinarm.kernels.compiling import Array
+from kinarm.kernels.goals import CONFIGURATION, DIRECTION, POSE, errors_between
 from kinarm.kernels.records import recorded
-from kinarm.policies.oracle.kernels.approach import WAITING, Boxes, layout, search
+from kinarm.policies.oracle.aims import Aims
+from kinarm.policies.oracle.kernels.approach import ROUNDING, WAITING, Boxes, layout, search
+from kinarm.policies.oracle.kernels.rotation import Turn
+from kinarm.policies.oracle.stages import Stage
 from kinarm.simulator import Simulator
 
 BUDGET = 100_000
@@ -19,17 +23,22 @@ RESOLUTION = 1e-3
 """How far a proven distance may be below the smallest one [m]."""
 
 
+SMALLEST = 1e-6
+"""Share of a step, and move in one, that count as rounding [rad]."""
+
+
 class Prover:
     """Proves bounds for the arm and scene of a simulator.
 
-    Starts have the shape (n, n_joints) [rad or m], goals (n, 3) [m]. With ``contact``, what is
-    proven to touch something does not count. A `search` may examine ``budget`` boxes.
+    Starts have the shape (n, n_joints) [rad or m]. Goals have the shape (n, goal_width), or (n,
+    horizon + 1, goal_width) if they move. With ``contact``, what is proven to touch something does
+    not count. A `search` may examine ``budget`` boxes.
     """
 
     def __init__(self, simulator: Simulator) -> None:
         chain, shapes, _ = simulator.world.records
         bounds = MotionBounds.of(simulator.arm.chain, simulator.n_actions)
-        self._simulator = simulator
+        self._simulator, self._bounds = simulator, bounds
         self._search = partial(search, chain, recorded(bounds), shapes)
 
     def bound_steps(
@@ -60,19 +69,25 @@ class Prover:
         """
         simulator, n = self._simulator, len(rows)
         lower_bounds, tight = np.empty(n, dtype=np.int64), np.empty(n, dtype=bool)
+        n_times = goals.shape[1] if goals.ndim == 3 else 1
+        placed = goals[rows].reshape(n * n_times, goals.shape[-1])
+        aims = Aims.of(simulator, np.repeat(starts[rows], n_times, axis=0), placed, ROUNDING)
 
         def bound_some(first: int, last: int) -> None:
-            limits, space = simulator.step_limit.copy(), self._space()
+            limits, tolerance = simulator.step_limit.copy(), simulator.task.tolerance
             best, (lower, upper) = np.empty(starts.shape[1]), np.empty((2, len(limits)))
-            tolerance = simulator.task.tolerance
+            space = self._space(len(aims.turn.axes))
             for i in range(first, last):
-                start, goal = starts[rows[i]].copy(), (*goals[rows[i]].tolist(),)
-                few, many, all_at_once = int(fewest[i]), int(most[i]), not contact
+                start, few, many = starts[rows[i]].copy(), int(fewest[i]), int(most[i])
+                all_at_once = not contact and n_times == 1
                 lower_bounds[i], tight[i] = few, True
                 while few <= many:
                     limit = many if all_at_once else few
-                    inputs = (limits, few, limit, tolerance, np.inf, contact, budget, lower, upper)
-                    complete, steps, _, _ = self._search(start, goal, *inputs, best, *space)
+                    goal, turn, allowed = aims.of_row(i * n_times + min(few, n_times - 1))
+                    inputs = (start, goal, turn, allowed, limits, few, limit, tolerance, np.inf)
+                    complete, steps, _, _ = self._search(
+                        *inputs, contact, budget, lower, upper, best, *space
+                    )
                     if steps <= limit:
                         witnesses[rows[i]] = best
                     if complete:
@@ -100,7 +115,7 @@ class Prover:
         """Bound how close the tool can come to goals, whatever it touches.
 
         Returned are distances proven and found, shape (n, 2) [m], and
-        configurations.
+        configurations. Of goals, only the positions count.
 
         Parameters
         ----------
@@ -115,10 +130,12 @@ class Prover:
         distances, configurations = np.empty((n, 2)), np.empty(starts.shape)
 
         def bound_some(first: int, last: int) -> None:
-            unlimited, space = np.full(n_moved, np.inf), self._space()
-            inputs = (unlimited, n_moved, n_moved, 0.0, resolution, False, budget)
+            unlimited, space = np.full(n_moved, np.inf), self._space(0)
+            nothing = np.empty((0, 3)), np.empty((0, 3)), 0.0, np.zeros(n_moved)
+            turn, allowed = recorded(Turn(*nothing)), np.empty((2, n_moved))
+            inputs = (turn, allowed, unlimited, n_moved, n_moved, 0.0, resolution, False, budget)
             for row in range(first, last):
-                start, goal = starts[row].copy(), (*goals[row].tolist(),)
+                start, goal = starts[row].copy(), (*goals[row, :3].tolist(),)
                 corners = (box[0][row].copy(), box[1][row].copy(), configurations[row])
                 _, _, found, proven = self._search(start, goal, *inputs, *corners, *space)
                 distances[row] = proven, found
@@ -126,8 +143,34 @@ class Prover:
         run_rows(bound_some, n, BUDGET * n, self._simulator.threads)
         return distances, configurations
 
-    def _space(self) -> tuple[Array, Boxes]:
-        """Space for boxes that wait and boxes that are examined."""
+    def steps_apart(self, before: Stage, after: Stage) -> NDArray[np.int64]:
+        """Fewest steps from anywhere at goals to others, shape (n,): at least one.
+
+        All joints move the tool as fast as they can, or turn it, or each joint
+        moves by itself to its place in a configuration.
+        """
+        simulator, world = self._simulator, self._simulator.world
+        kind, turn = world.rules.goal.kind, 2.0 * world.rules.goal.tolerance
+        limits, n = simulator.step_limit, simulator.n_actions
+        revolute = ~simulator.arm.chain.prismatic[:n]
+        if before.walks is not None:
+            return np.ones(len(after.goals), dtype=np.int64)
+        distances, turns = np.empty((2, len(after.goals)))
+        errors_between(kind, before.goals, after.goals, distances, turns)
+        speeds = np.where(revolute, np.diag(self._bounds.curvature), 1.0)
+        steps = (distances - 2.0 * world.rules.tolerance) / (speeds * limits).sum()
+        if kind in (DIRECTION, POSE):
+            fastest = max(float(limits[revolute].sum()), SMALLEST)
+            steps = np.fmax(steps, (turns - turn) / fastest)
+        elif kind == CONFIGURATION:
+            moved = np.abs(after.goals - before.goals)[:, 3 : 3 + n]
+            steps = np.fmax(steps, ((moved - turn) / limits).max(axis=1))
+        steps = np.clip(steps - SMALLEST, 1.0, simulator.task.horizon + 1.0)
+        fewest: NDArray[np.int64] = np.ceil(steps).astype(np.int64)
+        return fewest
+
+    def _space(self, n_axes: int) -> tuple[Array, Boxes]:
+        """Space for boxes that wait and boxes that are examined, with axes of the tool."""
         n, n_joints = self._simulator.n_actions, self._simulator.arm.n_joints
         n_placed = len(self._simulator.world.contact_model.shapes.placed)
-        return np.empty((WAITING, 2 * n + 1)), layout(n, n_joints, n_placed).record()
+        return np.empty((WAITING, 2 * n + 1)), layout(n, n_joints, n_placed, n_axes).record()

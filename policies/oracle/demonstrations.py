@@ -49,8 +49,8 @@ class Demonstrations:
         Where a motion ends, at its goal; and false.
     final_observations : ndarray, shape (n, n_observations)
         What was seen at the goals.
-    starts, goals : ndarray, shape (n, n_joints) and (n, 3)
-        Start configurations [rad or m] and goal positions [m].
+    starts, goals : ndarray, shape (n, n_joints) and (n, goal_width)
+        Start configurations [rad or m] and (first) goals [m].
 
     Raises
     ------
@@ -105,7 +105,7 @@ class Demonstrations:
         ----------
         simulator : Simulator
             The simulator.
-        starts, goals : ndarray, shape (n, n_joints) and (n, 3)
+        starts, goals : ndarray, shape (n, n_joints) and (n, goal_width)
             Of the motions [rad or m, m].
         actions : ndarray, shape (n, horizon, n_actions)
             Their actions.

@@ -1,5 +1,7 @@
 """Inverse kinematics: contact-free configurations at a goal."""
 
+from decimal import Context, Decimal
+from functools import cache
 from typing import NamedTuple
 
 import numpy as np
@@ -8,6 +10,8 @@ from numpy.typing import ArrayLike, NDArray
 from kinarm._parallel import run_rows
 from kinarm.errors import InvalidInputError, finite_array, whole_number
 from kinarm.kernels.compiling import Array
+from kinarm.kernels.records import recorded
+from kinarm.policies.oracle.aims import Aims
 from kinarm.policies.oracle.kernels.projection import damped_least_squares, layout
 from kinarm.randomness import low_discrepancy_points
 from kinarm.simulator import Simulator
@@ -42,8 +46,8 @@ def inverse_kinematics(
         Arm, scene and tolerance.
     start : array_like, shape (n_joints,)
         Current configuration; axes that are not actuated stay [rad or m].
-    goal : array_like, shape (3,)
-        Goal position [m].
+    goal : array_like, shape (goal_width,)
+        The goal, its position first [m].
     samples : int
         Configurations to begin with.
     separation : float
@@ -55,7 +59,7 @@ def inverse_kinematics(
         Solutions, that of the fewest steps first [rad or m]; k may be 0.
     """
     q = finite_array("start", start, (simulator.arm.n_joints,))
-    g = finite_array("goal", goal, (3,))
+    g = finite_array("goal", goal, (simulator.world.goal_width,))
     starts, goals = simulator.world.check_scenarios(q[None], g[None])
     horizon, tolerance = np.array([simulator.task.horizon]), np.array([simulator.task.tolerance])
     samples = whole_number("samples", samples, 1)
@@ -87,34 +91,49 @@ def solve_within(
         Arm and scene.
     starts, guesses : ndarray, shape (m, n_joints)
         Where the arm is, and likely solutions [rad or m].
-    goals : ndarray, shape (m, 3)
-        Goal positions [m].
+    goals : ndarray, shape (m, goal_width)
+        The goals, their positions first [m].
     steps, tolerances : ndarray of int and of float, shape (m,)
-        Most steps from the starts, and largest distances from the goals [m].
+        Most steps from the starts, and largest distances from the goals [m];
+        rotations have a tolerance in the same ratio to the task's.
     samples : int
         Configurations to begin from: start, guess, and evenly spread ones.
     """
     m, n_joints = len(starts), simulator.arm.n_joints
-    box = step_box(simulator, starts, steps)
-    spread = low_discrepancy_points(samples, simulator.n_actions + 1)
+    aims = Aims.of(simulator, starts, goals, -RESERVE * simulator.world.rules.goal.tolerance)
+    lower, upper = step_box(simulator, starts, steps)
+    box = np.fmax(lower, aims.lower), np.fmin(upper, aims.upper)
+    empty = np.any(box[0] > box[1], axis=1)
+    spread, shares = _beginnings(samples, simulator.n_actions)
     lower, upper, moved = box[0][:, None], box[1][:, None], slice(simulator.n_actions)
     beginnings = np.repeat(starts[:, None], samples, axis=1)
-    beginnings[:, :, moved] = lower + spread[:, :-1] * (upper - lower)
+    beginnings[:, :, moved] = lower + spread * (upper - lower)
     beginnings[:, 1 % samples] = guesses
     beginnings[:, 0] = starts
     beginnings[:, :, moved] = np.clip(beginnings[:, :, moved], lower, upper)
-    # Half of the solutions may rest on the rim of the ball, the others within.
-    shares = np.where(np.arange(samples) % 2 == 0, 1.0, np.cbrt(spread[:, -1]))
     owner = np.repeat(np.arange(m), samples)
     allowed = (tolerances * (1.0 - RESERVE))[owner]
     radius = allowed * np.tile(shares, m)
     configurations, distances = project(
-        simulator, beginnings.reshape(-1, n_joints), owner, box, goals, radius
+        simulator, beginnings.reshape(-1, n_joints), owner, box, aims, radius
     )
-    near = np.flatnonzero(distances <= allowed)
+    near = np.flatnonzero((distances <= allowed) & ~empty[owner])
     _, touching = simulator.world.screen(configurations[near])
     free = near[~touching]
     return Solutions(configurations[free], owner[free])
+
+
+@cache
+def _beginnings(samples: int, n: int) -> tuple[Array, Array]:
+    """Even points of n joints, and shares of the tolerance at which they may end.
+
+    Half of them may rest on the rim of the ball, the others within.
+    """
+    points, context = low_discrepancy_points(samples, n + 1), Context(prec=28)
+    third = context.divide(Decimal(1), Decimal(3))
+    # The cube root of floats would come from other libraries on other machines.
+    within = [float(context.power(Decimal(share), third)) for share in points[:, -1].tolist()]
+    return points[:, :-1], np.where(np.arange(samples) % 2 == 0, 1.0, within)
 
 
 def project(
@@ -122,13 +141,13 @@ def project(
     configurations: Array,
     owner: NDArray[np.int64],
     box: tuple[Array, Array],
-    goals: Array,
+    aims: Aims,
     radius: Array,
 ) -> tuple[Array, Array]:
     """Move configurations towards goals by damped least squares.
 
-    Returns where they end [rad or m], and distances from tool to goal [m].
-    Contact is ignored.
+    Returns where they end [rad or m], and distances from tool to goal [m], or
+    those of the tool's axes if larger. Contact is ignored.
 
     Parameters
     ----------
@@ -137,17 +156,19 @@ def project(
     configurations : ndarray, shape (k, n_joints)
         Where they begin [rad or m].
     owner, radius : ndarray of int and of float, shape (k,)
-        Row of box and goals for each, and how far from the goal it may rest
+        Row of box and aims for each, and how far from the goal it may rest
         [m].
-    box, goals : tuple of ndarray, shape (m, n_actions), and ndarray, shape (m, 3)
-        Lower and upper corners of their limits [rad or m], and goal positions
-        [m].
+    box, aims : tuple of ndarray, shape (m, n_actions), and Aims
+        Lower and upper corners of their limits [rad or m], and what m goals ask
+        for.
     """
     ended, distances = configurations.copy(), np.empty(len(configurations))
-    arrays = (simulator.world.records[0], owner, *box, goals, radius, ended, distances)
+    wanted = (aims.position, recorded(aims.turn), aims.wanted)
+    arrays = (simulator.world.records[0], owner, *box, *wanted, radius, ended, distances)
 
     def project_some(first: int, last: int) -> None:
-        moving = layout(simulator.arm.n_joints, simulator.n_actions).record()
+        sizes = (simulator.arm.n_joints, simulator.n_actions, len(aims.turn.axes))
+        moving = layout(*sizes).record()
         damped_least_squares(first, last, moving, *arrays)
 
     run_rows(project_some, len(ended), 4 * len(ended), simulator.threads)

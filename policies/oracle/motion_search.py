@@ -1,7 +1,4 @@
-"""Search for the motions that reach goals in the fewest steps.
-
-Detours are planned by RRT-Connect with shortcuts (Kuffner and LaValle 2000).
-"""
+"""Search for the motions that reach goals in the fewest steps."""
 
 import hashlib
 
@@ -9,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kinarm.kernels.compiling import Array
+from kinarm.policies.oracle.detours import find_detour, on_path
 from kinarm.policies.oracle.inverse import (
     Solutions,
     inverse_kinematics,
@@ -16,6 +14,7 @@ from kinarm.policies.oracle.inverse import (
     step_box,
     steps_between,
 )
+from kinarm.policies.oracle.stages import Stage
 from kinarm.randomness import low_discrepancy_points
 from kinarm.simulator import Simulator
 
@@ -35,29 +34,52 @@ MISS_COST = 1000.0
 class MotionSearch:
     """The best motions found so far for some trials.
 
-    Reaching the goal costs the steps taken, missing it more, and contact is
-    ruled out. The outcome in the simulator counts.
+    Reaching the goal costs the steps to it, missing it more, and contact is
+    ruled out. The outcome in the simulator counts. A goal that is to be held is
+    reached in the first of those steps.
+
+    Parameters
+    ----------
+    simulator : Simulator
+        Of one goal an episode.
+    starts : ndarray, shape (n, n_joints)
+        Where motions begin [rad or m].
+    stage : Stage
+        The goals.
+    taken : ndarray of int, shape (n,), optional
+        Steps that episodes have taken before.
 
     Attributes
     ----------
+    left : ndarray of int, shape (n,)
+        Steps in which a goal has to be reached.
     witnesses : ndarray, shape (n, n_joints)
         Configurations that attain what was proven last [rad or m].
     actions : ndarray, shape (n, horizon, n_actions)
         The motions; zero where there is none.
     costs : ndarray, shape (n,)
         Their costs; infinite where there is none.
+    ends : ndarray, shape (n, n_joints)
+        Where they end [rad or m].
     solved : ndarray of int, shape (n,)
         Fewest steps to a contact-free configuration at the goal, with or
         without a motion; the horizon + 1 if none was found.
     """
 
-    def __init__(self, simulator: Simulator, starts: Array, goals: Array) -> None:
-        n = len(starts)
-        self.simulator, self.starts, self.goals = simulator, starts, goals
+    def __init__(
+        self,
+        simulator: Simulator,
+        starts: Array,
+        stage: Stage,
+        taken: NDArray[np.int64] | None = None,
+    ) -> None:
+        n, self.simulator, self.starts, self.stage = len(starts), simulator, starts, stage
+        self.taken = np.zeros(n, dtype=np.int64) if taken is None else taken
+        self.left = simulator.task.horizon - (simulator.task.goal.hold - 1) - self.taken
         self._resting = simulator.without_moving_bodies()
         self.witnesses = starts.copy()
         self.actions = np.zeros((n, simulator.task.horizon, simulator.n_actions))
-        self.costs = np.full(n, np.inf)
+        self.costs, self.ends = np.full(n, np.inf), starts.copy()
         self.solved = np.full(n, simulator.task.horizon + 1)
 
     @property
@@ -74,7 +96,7 @@ class MotionSearch:
     def try_steps(self, rows: NDArray[np.int64], steps: NDArray[np.int64]) -> None:
         """Look for motions of so many steps where none reaches the goal yet."""
         for samples in SAMPLES:
-            due = ~self.reached[rows] & (steps <= self.simulator.task.horizon)
+            due = ~self.reached[rows] & (steps <= self.left[rows])
             rows, steps = rows[due], steps[due]
             if rows.size == 0:
                 return
@@ -84,15 +106,15 @@ class MotionSearch:
         self._try_vias(rows, steps, solutions, np.flatnonzero(~self.reached[rows] & (steps > 1)))
 
     def try_detours(self, rows: NDArray[np.int64]) -> None:
-        """Plan detours where no motion reaches the goal yet."""
-        for row in rows[~self.reached[rows]]:
-            ends = inverse_kinematics(self._resting, self.starts[row], self.goals[row])
+        """Plan detours where no motion reaches the goal yet, if it stands."""
+        for row in rows[~self.reached[rows]] if self.stage.walks is None else []:
+            ends = inverse_kinematics(self._resting, self.starts[row], self.stage.goals[row])
             if len(ends) == 0:
                 continue
             nearest = steps_between(self.simulator, self.starts[row], ends[0])
             self.solved[row] = min(self.solved[row], int(np.ceil(nearest)))
             # Random numbers of a trial depend on its start and goal alone.
-            numbers = np.concatenate([self.starts[row], self.goals[row]]) + 0.0
+            numbers = np.concatenate([self.starts[row], self.stage.goals[row]]) + 0.0
             digest = hashlib.sha256(numbers.tobytes()).digest()
             rng = np.random.default_rng(np.frombuffer(digest, dtype=np.uint32))
             for _ in range(DETOURS):
@@ -111,7 +133,7 @@ class MotionSearch:
             rows, distances = rows[due], distances[due]
             if rows.size == 0:
                 return
-            steps = np.full(rows.size, self.simulator.task.horizon)
+            steps = np.fmax(self.left[rows], 1)
             solutions = self._try_straight(rows, steps, distances + nearer, SAMPLES[-1])
             due = np.isinf(self.costs[rows]) & (steps > 1)
             self._try_vias(rows, steps, solutions, np.flatnonzero(due))
@@ -120,7 +142,11 @@ class MotionSearch:
         self, rows: NDArray[np.int64], steps: NDArray[np.int64], tolerances: Array, samples: int
     ) -> Solutions:
         """Try straight motions to the goals; owners count in ``rows``."""
-        starts, goals, guesses = self.starts[rows], self.goals[rows], self.witnesses[rows]
+        starts, goals, guesses = self.starts[rows], self.stage.goals[rows], self.witnesses[rows]
+        if self.stage.walks is not None:
+            # The middle of the steps in which the goal is to be held.
+            middle = steps + (self.simulator.task.goal.hold - 1) // 2
+            goals = self.stage.walks[rows, middle]
         found = solve_within(self._resting, starts, goals, steps, tolerances, guesses, samples)
         owner, ends = found.owner, found.configurations
         due = steps[owner]
@@ -155,14 +181,34 @@ class MotionSearch:
 
     def _replay(self, trials: NDArray[np.int64], actions: Array) -> None:
         """Run motions in the simulator, and keep those better than before."""
-        outcome = self.simulator.rollout_actions(actions, self.starts[trials], self.goals[trials])
+        simulator, taken = self.simulator, self.taken[trials]
+        begun = self.starts[trials], self.stage.goals[trials]
+        outcome = simulator.rollout_actions(delayed(actions, taken), *begun, taken=taken)
         missed = np.where(outcome.collision, np.inf, MISS_COST + outcome.distance)
-        costs = np.where(outcome.success, outcome.steps, missed)
+        steps = outcome.steps - taken - (simulator.task.goal.hold - 1)
+        costs = np.where(outcome.success, steps, missed)
         order = np.lexsort((costs, trials))
         best = order[np.unique(trials[order], return_index=True)[1]]
         better = best[costs[best] < self.costs[trials[best]]]
         self.actions[trials[better]] = actions[better]
         self.costs[trials[better]] = costs[better]
+        self.ends[trials[better]] = outcome.configurations[better]
+
+
+def delayed(actions: Array, taken: NDArray[np.int64]) -> Array:
+    """Motions that begin after some steps, shape (n, horizon, n_actions); their ends are lost.
+
+    Parameters
+    ----------
+    actions, taken : ndarray, shape (n, horizon, n_actions) and (n,)
+        The motions, and the steps before them, in which nothing is done.
+    """
+    if not taken.any():
+        return actions
+    later = np.zeros_like(actions)
+    for row, steps in enumerate(taken.tolist()):
+        later[row, steps:] = actions[row, : actions.shape[1] - steps]
+    return later
 
 
 def two_segments(
@@ -218,114 +264,7 @@ def along_path(simulator: Simulator, path: Array, *, through_corners: bool) -> A
     if n_steps > simulator.task.horizon:
         return None
     times = np.minimum(np.arange(n_steps + 1), arrival[-1])
-    visited = np.stack(
-        [np.interp(times, arrival, path[:, axis]) for axis in range(simulator.n_actions)], axis=1
-    )
+    visited = on_path(path, arrival, times)[:, : simulator.n_actions]
     actions = np.zeros((simulator.task.horizon, simulator.n_actions))
     actions[:n_steps] = np.diff(visited, axis=0) / simulator.step_limit
     return actions
-
-
-EXTENSIONS, LONGEST_EXTENSION = 1500, 6.0
-"""Samples at most, and how far a tree grows towards one [steps]."""
-
-SHORTCUTS = 120
-"""Pairs of points between which the straight way is tried."""
-
-
-class Tree:
-    """Configurations connected to roots by contact-free straight motions."""
-
-    def __init__(self, roots: Array) -> None:
-        self.nodes = roots.copy()
-        self.parents = [-1] * len(roots)
-
-    def add(self, node: Array, parent: int) -> int:
-        """Append a node and return its index."""
-        self.nodes = np.concatenate([self.nodes, node[None]])
-        self.parents.append(parent)
-        return len(self.parents) - 1
-
-    def path_to_root(self, node: int) -> list[Array]:
-        """Nodes from this one to its root."""
-        found = []
-        while node >= 0:
-            found.append(self.nodes[node])
-            node = self.parents[node]
-        return found
-
-
-def find_detour(
-    simulator: Simulator, start: Array, ends: Array, rng: np.random.Generator
-) -> Array | None:
-    """Find a contact-free path of straight segments to one of several ends.
-
-    Two trees grow in turns until they meet. The path has the shape (m,
-    n_joints); None if none was found.
-
-    Parameters
-    ----------
-    simulator, rng
-        Arm and scene, and the source of samples and shortcuts.
-    start, ends : ndarray, shape (n_joints,) and (k, n_joints)
-        Where the path begins and may end, without contact [rad or m].
-    """
-    moved, n = slice(simulator.n_actions), simulator.n_actions
-    lower, upper = simulator.arm.lower[moved], simulator.arm.upper[moved]
-    growing, other = Tree(start[None]), Tree(ends)
-    from_start = True
-    for _ in range(EXTENSIONS):
-        sample = start.copy()
-        sample[moved] = rng.uniform(lower, upper, n)
-        grown = _extend(simulator, growing, sample, LONGEST_EXTENSION)
-        if grown is not None:
-            node = growing.nodes[grown]
-            met = _extend(simulator, other, node, np.inf)
-            if met is not None and steps_between(simulator, other.nodes[met], node) < 1e-9:
-                near, far = growing.path_to_root(grown)[::-1], other.path_to_root(met)[1:]
-                path = np.array(near + far)
-                return _shorten(simulator, path if from_start else path[::-1], rng)
-        growing, other, from_start = other, growing, not from_start
-    return None
-
-
-def _extend(simulator: Simulator, tree: Tree, sample: Array, longest: float) -> int | None:
-    """Grow a tree towards a sample, as far as nothing touches."""
-    distances = steps_between(simulator, tree.nodes, sample)
-    nearest = int(distances.argmin())
-    if distances[nearest] < 1e-9:
-        return nearest
-    origin = tree.nodes[nearest]
-    towards = origin + min(1.0, longest / distances[nearest]) * (sample - origin)
-    on_the_way, free = _straight_way(simulator, origin, towards)
-    return tree.add(on_the_way[free - 1], nearest) if free else None
-
-
-def _straight_way(simulator: Simulator, first: Array, second: Array) -> tuple[Array, int]:
-    """Configurations on the way, and how many in a row touch nothing."""
-    parts = simulator.world.rules.parts
-    count = max(1, int(np.ceil(parts * steps_between(simulator, first, second))))
-    tested = first + np.arange(1, count + 1)[:, None] / count * (second - first)
-    tested[-1] = second
-    _, touching = simulator.world.screen(tested)
-    return tested, int(touching.argmax()) if touching.any() else count
-
-
-def _shorten(simulator: Simulator, path: Array, rng: np.random.Generator) -> Array:
-    """Replace parts of a path by the straight way where nothing touches."""
-    for _ in range(SHORTCUTS):
-        if len(path) < 3:
-            break
-        lengths = steps_between(simulator, path[:-1], path[1:])
-        arrival = np.concatenate([[0.0], np.cumsum(lengths)])
-        a, b = np.sort(rng.uniform(0.0, arrival[-1], 2))
-        first, second = (
-            np.array([np.interp(time, arrival, axis) for axis in path.T]) for time in (a, b)
-        )
-        if steps_between(simulator, first, second) > b - a - 1e-6:
-            continue
-        tested, free = _straight_way(simulator, first, second)
-        if free == len(tested):
-            before, after = path[arrival < a], path[arrival > b]
-            path = np.concatenate([before, first[None], second[None], after])
-    return path

@@ -12,13 +12,18 @@ where the arm touches something, as far as its shapes are capsules. Boxes and
 distances are enlarged by 1e-9 to cover rounding. When a budget runs out, what
 is proven stands, marked as incomplete. Bodies that move raise no bound.
 
+A goal that is held is reached some steps after the first within the tolerances. One that moves has
+a proof of its own for each number of steps. In a sequence, a goal is bounded from the start, and by
+the goal before: the tool has to leave its tolerances, as fast as its joints could take it together.
+
 Found, by search, and replayed in the simulator, where bodies move: a contact-free motion to the
 goal. It need not be the fastest, and finding none proves nothing.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from copy import copy
-from dataclasses import dataclass, fields
+from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -36,6 +41,8 @@ from kinarm.policies.oracle.bounding import Prover
 from kinarm.policies.oracle.demonstrations import Demonstrations
 from kinarm.policies.oracle.inverse import step_box
 from kinarm.policies.oracle.motion_search import MotionSearch
+from kinarm.policies.oracle.solutions import OracleSolution, OracleSolutions
+from kinarm.policies.oracle.stages import Stage, stages_of
 from kinarm.problem import ProblemLike
 from kinarm.randomness import Stream, stream_generator
 from kinarm.simulator import Simulator
@@ -69,27 +76,33 @@ class Oracle:
 
     def __init__(self, problem: ProblemLike, *, threads: int | None = None) -> None:
         self.simulator = Simulator(problem, threads=threads).with_plant(Plant())
-        self._prover = Prover(self.simulator.without_moving_bodies())
+        self._single, goal = self.simulator, self.simulator.task.goal
+        if goal.sequence > 1:
+            first = self.simulator.problem.replace(goal=replace(goal, sequence=1))
+            self._single = Simulator(first, threads=threads)
+        self._prover = Prover(self._single.without_moving_bodies())
 
     def __repr__(self) -> str:
         return f"Oracle({self.simulator.problem!r})"
 
-    def solve(self, start: ArrayLike, goal: ArrayLike) -> "OracleSolution":
+    def solve(self, start: ArrayLike, goal: ArrayLike) -> OracleSolution:
         """Solve one trial; see `solve_batch`."""
         q = finite_array("start", start, (self.simulator.arm.n_joints,))
-        return self.solve_batch(q[None], finite_array("goal", goal, (3,))[None])[0]
+        width = self.simulator.world.goal_width
+        return self.solve_batch(q[None], finite_array("goal", goal, (width,))[None])[0]
 
     def solve_batch(
         self, starts: ArrayLike, goals: ArrayLike, *, on_progress: Progress | None = None
-    ) -> "OracleSolutions":
+    ) -> OracleSolutions:
         """Solve many trials.
 
         Parameters
         ----------
         starts : array_like, shape (n, n_joints) or (n_joints,)
             Contact-free start configurations, or one for all goals [rad or m].
-        goals : array_like, shape (n, 3) or (3,)
-            Goal positions, or one for all starts [m].
+        goals : array_like, shape (n, goal_width) or (goal_width,)
+            Goals, or one for all starts: positions [m] and their rests. Of a
+            sequence, the first ones.
         on_progress : callable, optional
             Called with the numbers of trials solved and in all.
 
@@ -149,13 +162,13 @@ class Oracle:
     def _scenarios(self, starts: ArrayLike, goals: ArrayLike) -> tuple[Array, Array]:
         """Starts and goals, one row a trial, if they are possible."""
         q, one_start = one_or_many("starts", starts, (self.simulator.arm.n_joints,))
-        g, one_goal = one_or_many("goals", goals, (3,))
+        g, one_goal = one_or_many("goals", goals, (self.simulator.world.goal_width,))
         q = np.tile(q, (len(g) if one_start else 1, 1))
         g = np.tile(g, (len(q) if one_goal else 1, 1))
         episodes = self.simulator.reset(q, g)
-        return episodes.q, episodes.goal
+        return episodes.q, episodes.first_goals
 
-    def _solve_lots(self, starts: Array, goals: Array) -> "list[OracleSolutions]":
+    def _solve_lots(self, starts: Array, goals: Array) -> list[OracleSolutions]:
         """Solve trials together, or each in its own scene."""
         if not self.simulator.world.has_random_bodies:
             return [self._solve_lot(starts, goals)]
@@ -163,32 +176,39 @@ class Oracle:
         for row in range(len(starts)):
             alone = copy(self)
             alone.simulator = self.simulator.in_scene(starts[row], goals[row])
-            alone._prover = Prover(alone.simulator.without_moving_bodies())
+            alone._single = self._single.in_scene(starts[row], goals[row])
+            alone._prover = Prover(alone._single.without_moving_bodies())
             found.append(alone._solve_lot(starts[row : row + 1], goals[row : row + 1]))
         return found
 
-    def _solve_lot(self, starts: Array, goals: Array) -> "OracleSolutions":
+    def _solve_lot(self, starts: Array, goals: Array) -> OracleSolutions:
         """Bounds, motions and their replay."""
-        horizon, n = self.simulator.task.horizon, len(starts)
-        search = MotionSearch(self.simulator, starts, goals)
-        trials, limits = (starts, goals, search.witnesses), np.tile([[1], [horizon]], n)
-        steps_bounds, complete = self._prover.bound_steps(*trials, np.arange(n), *limits)
-        within = np.flatnonzero(steps_bounds <= horizon)
-        for extra in range(EXTRA_STEPS + 1):
-            search.try_steps(within, steps_bounds[within] + extra)
-        search.try_detours(within)
-        self._count_contact(search, steps_bounds, complete)
-        distance_bounds = self._approach(search, steps_bounds)
-        replay = self.simulator.rollout_actions(search.actions, starts, goals, record=True)
+        horizon, stages = self.simulator.task.horizon, stages_of(self.simulator, starts, goals)
+        search = MotionSearch(self._single, starts, stages[0])
+        arrivals, complete = self._search(search)
+        self._count_contact(search, arrivals, complete)
+        distance_bounds = self._approach(search, arrivals)
+        for before, stage in pairwise(stages):
+            fewest = arrivals + self._rest + self._prover.steps_apart(before, stage)
+            trials = (starts, stage.targets, starts.copy(), np.arange(len(starts)))
+            arrivals, complete = self._prover.bound_steps(*trials, fewest, search.left)
+            complete, distance_bounds = complete & (arrivals > self._last), 0.0 * distance_bounds
+        steps_bounds = np.where(arrivals > self._last, horizon + 1, arrivals + self._rest)
+        actions = self._follow(search, stages)
+        replay = self.simulator.rollout_actions(actions, starts, goals, record=True)
         # A motion that was to come close may reach the goal all the same.
         distance_bounds[replay.success] = 0.0
         complete |= replay.success & (replay.steps == steps_bounds)
         no_motion = f"no contact-free motion of {horizon} steps or less found"
         no_end = "no contact-free configuration at the goal found"
-        reasons = [no_motion if steps <= horizon else no_end for steps in search.solved]
+        reasons = [no_motion if steps <= self._last else no_end for steps in search.solved]
         for row in np.flatnonzero(steps_bounds > horizon):
-            away = f"{distance_bounds[row]:.3f} m away or more within {horizon} steps"
-            reasons[row] = f"out of reach: proven to stay {away}"
+            away = (
+                f"proven to stay {distance_bounds[row]:.3f} m away or more within {horizon} steps"
+            )
+            if not self.simulator.task.goal.plain:
+                away = f"proven for all motions of {horizon} steps"
+            reasons[row] = f"out of reach: {away}"
         return OracleSolutions(
             reachable=replay.success,
             proof_complete=complete,
@@ -196,17 +216,49 @@ class Oracle:
             steps_lower_bound=steps_bounds,
             final_distance=replay.distance,
             distance_lower_bound=distance_bounds,
-            actions=search.actions,
+            actions=actions,
             paths=replay.paths,
             reasons=np.array(np.where(replay.success, "", reasons), dtype=np.str_),
         )
+
+    @property
+    def _rest(self) -> int:
+        """Steps for which a goal is to be held after the first one."""
+        return self.simulator.task.goal.hold - 1
+
+    @property
+    def _last(self) -> int:
+        """Last step in which a goal can be reached first."""
+        return self.simulator.task.horizon - self._rest
+
+    def _search(self, search: MotionSearch) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
+        """Bound the first step at goals, and look for motions that take few more."""
+        rows = np.arange(len(search.starts))
+        trials = (search.starts, search.stage.targets, search.witnesses, rows)
+        arrivals, complete = self._prover.bound_steps(*trials, np.ones_like(rows), search.left)
+        within = np.flatnonzero(arrivals <= search.left)
+        for extra in range(EXTRA_STEPS + 1):
+            search.try_steps(within, arrivals[within] + extra)
+        search.try_detours(within)
+        return arrivals, complete
+
+    def _follow(self, search: MotionSearch, stages: list[Stage]) -> Array:
+        """Motions to one goal after the other, as far as some are found."""
+        actions, rows = search.actions, np.arange(len(search.starts))
+        for stage in stages[1:]:
+            reached = search.reached
+            rows, taken = rows[reached], (search.taken + search.steps)[reached] + self._rest
+            search = MotionSearch(self._single, search.ends[reached], stage.of(rows, taken), taken)
+            self._search(search)
+            for row, steps, motion in zip(rows, taken, search.actions, strict=True):
+                actions[row, steps:] = motion[: len(motion) - steps]
+        return actions
 
     def _count_contact(
         self, search: MotionSearch, steps_bounds: NDArray[np.int64], complete: NDArray[np.bool_]
     ) -> None:
         """Raise bounds where motions are slower, or none reaches the goal."""
-        horizon = self.simulator.task.horizon
-        trials = (search.starts, search.goals, search.witnesses)
+        trials = (search.starts, search.stage.targets, search.witnesses)
         bound_steps = self._prover.bound_steps
         # A contact-free configuration ends the proof, even without a motion to it.
         fewest = np.fmin(search.steps, search.solved)
@@ -214,122 +266,26 @@ class Oracle:
         steps_bounds[slow], complete[slow] = bound_steps(
             *trials, slow, steps_bounds[slow], fewest[slow] - 1, contact=True
         )
-        blocked = np.flatnonzero((fewest > horizon) & (steps_bounds <= horizon))
-        last = np.full(blocked.size, horizon)
-        beyond, _ = bound_steps(*trials, blocked, last, last, contact=True)
-        complete[~search.reached & (steps_bounds <= horizon)] = False
-        shut = blocked[beyond > horizon]
-        steps_bounds[shut], complete[shut] = horizon + 1, True
+        blocked = np.flatnonzero((fewest > self._last) & (steps_bounds <= self._last))
+        last = np.full(blocked.size, self._last)
+        # Of a goal that moves, all places count.
+        first = last if search.stage.walks is None else steps_bounds[blocked]
+        beyond, _ = bound_steps(*trials, blocked, first, last, contact=True)
+        complete[~search.reached & (steps_bounds <= self._last)] = False
+        shut = blocked[beyond > self._last]
+        steps_bounds[shut], complete[shut] = self._last + 1, True
 
     def _approach(self, search: MotionSearch, steps_bounds: NDArray[np.int64]) -> Array:
         """Prove, and seek, how close motions come to goals that none reaches."""
         task, missed = self.simulator.task, np.flatnonzero(~search.reached)
-        starts, goals = search.starts[missed], search.goals[missed]
+        starts, goals = search.starts[missed], search.stage.goals[missed]
         box = step_box(self.simulator, starts, np.full(missed.size, task.horizon))
-        proven, search.witnesses[missed] = self._prover.bound_distance(starts, goals, box)
         distances = np.zeros(len(steps_bounds))
-        distances[missed] = proven[:, 0]
-        out_of_reach = steps_bounds > task.horizon
-        distances[out_of_reach] = np.fmax(distances[out_of_reach], task.tolerance)
+        if search.stage.walks is None:
+            proven, search.witnesses[missed] = self._prover.bound_distance(starts, goals, box)
+            distances[missed] = proven[:, 0]
+        if task.goal.plain:
+            out_of_reach = steps_bounds > task.horizon
+            distances[out_of_reach] = np.fmax(distances[out_of_reach], task.tolerance)
         search.try_approach(missed, np.fmax(distances[missed], task.tolerance))
         return distances
-
-
-@dataclass(frozen=True, eq=False)
-class OracleSolution:
-    """Bounds and motion of one trial.
-
-    Attributes
-    ----------
-    reachable : bool
-        Whether the motion reaches the goal in the simulator.
-    steps : int
-        Steps of the motion; the horizon if it does not reach the goal.
-    steps_lower_bound : int
-        Proven: no motion reaches the goal in fewer steps. The horizon + 1 if it
-        is out of reach.
-    proof_complete : bool
-        Whether a configuration at the goal, not proven to touch anything, is
-        that many steps away, the motion takes as many, or the goal is proven to
-        be out of reach. Else the budget ran out. Contact on the way may make
-        ``steps`` larger.
-    final_distance : float
-        Distance from tool to goal at the end of the motion [m].
-    distance_lower_bound : float
-        Proven: no motion within the horizon ends closer [m]. Zero if one
-        reaches the goal.
-    path : ndarray, shape (steps + 1, n_joints)
-        Configurations of the motion in the simulator [rad or m].
-    actions : ndarray, shape (steps, n_actions)
-        Actions of the motion.
-    reason : str or None
-        Why no motion reaches the goal; None if one does.
-    """
-
-    reachable: bool
-    steps: int
-    steps_lower_bound: int
-    proof_complete: bool
-    final_distance: float
-    distance_lower_bound: float
-    path: NDArray[np.float64]
-    actions: NDArray[np.float64]
-    reason: str | None
-
-
-NUMBERS = [item.name for item in fields(OracleSolution)][:6]
-
-
-@dataclass(frozen=True, eq=False)
-class OracleSolutions:
-    """Bounds and motions of n trials; indexing gives an `OracleSolution`.
-
-    Its fields are arrays of shape (n,) here; the others are
-
-    Attributes
-    ----------
-    actions : ndarray, shape (n, horizon, n_actions)
-        Actions of the motions, zero after their end.
-    paths : ndarray, shape (n, horizon + 1, n_joints)
-        Configurations of the motions, NaN after their end [rad or m].
-    reasons : ndarray of str, shape (n,)
-        Why no motion reaches the goal; empty if one does.
-    """
-
-    reachable: NDArray[np.bool_]
-    proof_complete: NDArray[np.bool_]
-    steps: NDArray[np.int64]
-    steps_lower_bound: NDArray[np.int64]
-    final_distance: NDArray[np.float64]
-    distance_lower_bound: NDArray[np.float64]
-    actions: NDArray[np.float64]
-    paths: NDArray[np.float64]
-    reasons: NDArray[np.str_]
-
-    def __post_init__(self) -> None:
-        for array in vars(self).values():
-            array.flags.writeable = False
-
-    def __len__(self) -> int:
-        return len(self.steps)
-
-    def __repr__(self) -> str:
-        return f"OracleSolutions({len(self)} trials, {int(self.reachable.sum())} reached)"
-
-    def __iter__(self) -> Iterator[OracleSolution]:
-        return (self[index] for index in range(len(self)))
-
-    def __getitem__(self, index: int) -> OracleSolution:
-        steps, known = int(self.steps[index]), vars(self)
-        return OracleSolution(
-            **{name: known[name][index].item() for name in NUMBERS},
-            path=self.paths[index, : steps + 1],
-            actions=self.actions[index, :steps],
-            reason=str(self.reasons[index]) or None,
-        )
-
-    @classmethod
-    def concatenated(cls, parts: "list[OracleSolutions]") -> "OracleSolutions":
-        """Join the solutions of several sets of trials."""
-        lots = [vars(part) for part in parts]
-        return cls(**{name: np.concatenate([lot[name] for lot in lots]) for name in lots[0]})

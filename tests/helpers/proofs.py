@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from simulators import changed
 
+from kinarm.policies.oracle.aims import Aims
 from kinarm.policies.oracle.bounding import Prover
 from kinarm.reference import ReferenceSimulator
 
@@ -25,6 +26,11 @@ def prove_distance(simulator, starts, goals, box=None, **settings):
     prover = Prover(simulator)
     distances, configurations = prover.bound_distance(starts, goals, box or whole, **settings)
     return *distances.T, configurations
+
+
+def aims_at(simulator, goals):
+    """What goals ask for, whatever joints that are not actuated do."""
+    return Aims.of(simulator, np.zeros((len(goals), simulator.arm.n_joints)), goals, 0.0)
 
 
 def within(lower, upper, start, rng, count):

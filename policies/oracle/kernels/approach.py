@@ -2,8 +2,8 @@
 
 A box of configurations is excluded, or cut, where a lower bound of the distance exceeds what is
 asked for. On demand it is excluded, too, if some pair of bodies is proven to overlap throughout
-(`kinarm.policies.oracle.kernels.box_proofs`). Another box is tried where the linear model of the
-arm comes closest to the goal, and halved. Boxes are examined side by side, in lanes.
+(`kinarm.policies.oracle.kernels.contact_proofs`). Another box is tried where the linear model of
+the arm comes closest to the goal, and halved. Boxes are examined side by side, in lanes.
 """
 
 import math
@@ -25,8 +25,14 @@ from kinarm.policies.oracle.kernels.box_proofs import (
     curved_bound,
     joint_bound,
     offset_from_goal,
-    overlaps,
     trim,
+)
+from kinarm.policies.oracle.kernels.contact_proofs import overlaps
+from kinarm.policies.oracle.kernels.rotation import (
+    Turn,
+    angle_bound,
+    axes_jacobian,
+    turn_from_goal,
 )
 
 WAITING = 4096
@@ -38,6 +44,9 @@ SMALLEST = 1e-6
 ROUNDING = 1e-9
 """Added to boxes and distances to cover rounding [rad, m]."""
 
+AIMED = 0.9
+"""Share of the tolerance that boxes are separated from, where rotation counts."""
+
 STEP_ROUNDING = 2.0**-51
 """Most that a step rounds a joint's position by, as a share of its largest one."""
 
@@ -47,12 +56,15 @@ Boxes = Any
 
 
 @cache
-def layout(n: int, n_joints: int, n_placed: int) -> Layout:
+def layout(n: int, n_joints: int, n_placed: int, n_axes: int) -> Layout:
     """Work space for boxes of the first n joints, in a scene of ``n_placed`` bodies.
+
+    ``n_axes`` is 0 where only positions count; kernels are compiled for that.
 
     All are arrays of lanes, but for ``lever``; `kinarm.kernels.lanes.as_numbers`
     adds an axis, that of the boxes.
     """
+    rows = 3 * n_axes if n_axes > 0 else Fixed(0)
     shapes = {
         # A row of the stack: lower and upper corner [rad or m], and proven distance [m].
         # Half-widths, and the share that is left.
@@ -68,6 +80,9 @@ def layout(n: int, n_joints: int, n_placed: int) -> Layout:
         **dict.fromkeys(("jacobian", "turns"), (THREE, n)),
         # Vector from the goal to the tool; step, scale, slope, least and bend of `curved_bound`.
         "model": (Fixed(6), max(n, 3)),
+        # Entries of axes: Jacobian [m/rad]; apart, aside and twist of `curved_bound`.
+        "spin": (rows, n),
+        "turned": (Fixed(3), rows),
     }
     arrays = {name: (lanes, shape) for name, shape in shapes.items()}
     # How far each joint moves the tool, or what counts as that [m/rad, or m/m].
@@ -83,13 +98,19 @@ def drift(chain: Chain, joint: int, steps: int) -> float:
 
 @inlined
 def within_steps(
-    chain: Chain, start: Array, step_limit: Array, steps: int, lower: Array, upper: Array
+    chain: Chain,
+    allowed: Array,
+    start: Array,
+    step_limit: Array,
+    steps: int,
+    lower: Array,
+    upper: Array,
 ) -> None:
-    """Fill in corners of what joints can reach in some steps."""
+    """Fill in corners of what joints can reach in some steps, and may."""
     for i in range(step_limit.shape[0]):
         reach = steps * step_limit[i] + drift(chain, i, steps)
-        lower[i] = max(chain.lower[i], start[i] - reach)
-        upper[i] = min(chain.upper[i], start[i] + reach)
+        lower[i] = max(allowed[0, i], start[i] - reach)
+        upper[i] = min(allowed[1, i], start[i] + reach)
 
 
 @inlined
@@ -125,6 +146,8 @@ def search(
     shapes: ContactShapes,
     start: Array,
     goal: Vector,
+    turn: Turn,
+    allowed: Array,
     step_limit: Array,
     fewest: int,
     most: int,
@@ -142,15 +165,18 @@ def search(
 
     With an infinite resolution, the search is for one close enough to the goal
     in the fewest steps from the start. Else it is for the closest one, whose
-    distance may exceed what is proven by the resolution.
+    distance may exceed what is proven by the resolution. The distance of a goal
+    with rotations is that of the tool or of its axes, whichever is larger.
 
     Parameters
     ----------
     chain, bounds, shapes
         The arm, bounds of its motion, and what may touch.
-    start, goal, step_limit
-        The arm's start, shape (n_joints,), the goal [m], and moves in a step,
-        shape (n,).
+    start, goal, turn, step_limit
+        The arm's start, shape (n_joints,), the goal [m] and its rotations, and
+        moves in a step, shape (n,).
+    allowed : ndarray, shape (2, n)
+        Limits of the first n joints in a search for the fewest steps [rad or m].
     fewest, most : int
         Range of the steps.
     enough, resolution : float
@@ -180,6 +206,7 @@ def search(
     jacobian, turns, model = block.jacobian, block.turns, block.model
     offset, step, scale = model[0], model[1], model[2]
     slope, least, bend = model[3], model[4], model[5]
+    spin, turned, apart = block.spin, block.turned, block.turned[0]
     places = (as_numbers(block.q), as_numbers(block.tried))
     found, lower_bounds = as_numbers(block.distance), as_numbers(box)
     shares = as_numbers(block.share)
@@ -191,16 +218,18 @@ def search(
         best[i] = start[i]
     fewer = resolution == np.inf
     if fewer:
-        within_steps(chain, start, step_limit, most, lower, upper)
+        within_steps(chain, allowed, start, step_limit, most, lower, upper)
     for i in range(n):
-        lever[i] = 1.0 if chain.prismatic[i] else bounds.curvature[i, i]
+        lever[i] = turn.turning[i] + (1.0 if chain.prismatic[i] else bounds.curvature[i, i])
         # Joints that hardly move the tool still decide what it touches.
         lever[i] = math.sqrt(lever[i]) if contact else lever[i]
         stack[0, i], stack[0, n + i], stack[0, 2 * n] = lower[i], upper[i], 0.0
     steps, closest, proven = most + 1, np.inf, np.inf
+    # With axes, boxes are separated from balls that are smaller, since models are not exact.
+    aimed = AIMED * enough
     # Boxes are excluded beyond the cutoff, which falls with every closer configuration found: what
     # is not closer by the resolution does not matter.
-    cutoff = enough + ROUNDING if fewer else np.inf
+    cutoff = enough + max(1.0, turn.weight) * ROUNDING if fewer else np.inf
     waiting, examined, undecided = 1, 0, False
     # Depth first: the stack stays short, and leads straight to where the model expects the goal.
     # What is found there lowers the cutoff, or the steps, for all boxes.
@@ -224,15 +253,23 @@ def search(
         empty = narrowest < 0.0
         # Bound the distance over a box by a linear model at its centre and its curvature.
         block.distance[0] = offset_from_goal(chain, block.q, goal, block.poses, offset)
+        if spin.shape[0] > 0:
+            length = turn_from_goal(turn, n_joints, block.poses, apart)
+            axes_jacobian(chain, turn, block.poses, apart, spin)
+            at_angle = angle_bound(turn, length, half)
+            block.distance[0] = max(block.distance[0], length)
         tool = (goal[0] + offset[0], goal[1] + offset[1], goal[2] + offset[2])
         point_jacobian(chain, block.poses, tool, jacobian)
-        direction = closest_step(jacobian, offset, half, step, scale)
-        linear = (block.poses, jacobian, offset, direction, half)
-        bound = curved_bound(chain, bounds.curvature, *linear, slope, least, bend)
+        direction = closest_step(jacobian, offset, half, step, scale, spin, turned, aimed)
+        linear = (block.poses, jacobian, offset, direction, half, slope, least, bend)
+        bound = curved_bound(chain, bounds.curvature, *linear, turn, spin, turned)
         # Where the linear model comes closest to the goal, the arm mostly does, too.
         for i in range(n):
             block.tried[0, i] = block.q[0, i] + step[i]
         block.distance[1] = offset_from_goal(chain, block.tried, goal, block.between, offset)
+        if spin.shape[0] > 0:
+            length = turn_from_goal(turn, n_joints, block.between, apart)
+            block.distance[1] = max(block.distance[1], length)
         # Those count that come closer than what was found, and are free.
         far = enough if fewer else closest
         at_centre = ~empty & (block.distance[0] <= far)
@@ -256,7 +293,7 @@ def search(
                 if np.ceil(needed) >= steps:
                     continue
                 steps = int(np.ceil(needed))
-                within_steps(chain, start, step_limit, steps - 1, lower, upper)
+                within_steps(chain, allowed, start, step_limit, steps - 1, lower, upper)
             elif distance >= closest:
                 continue
             else:
@@ -268,6 +305,8 @@ def search(
         block.share[0] = trim(cutoff, bound, slope, least, bend, block.q, half, *sides)
         # The bound of the joints settles large boxes far from the goal.
         bound = max(bound, joint_bound(bounds, block.poses, goal, half))
+        if spin.shape[0] > 0:
+            bound = max(bound, at_angle)
         # What is proven of the whole holds for its parts.
         box[0, 2 * n] = max(box[0, 2 * n], bound)
         beyond = box[0, 2 * n] > cutoff

@@ -10,11 +10,13 @@ from numpy.typing import NDArray
 
 from kinarm.chain import Chain
 from kinarm.kernels.compiling import Array, Vector, inlined, lean_kernel
-from kinarm.kernels.inverse import take_out_blocked, take_step
+from kinarm.kernels.inverse import damped_step as damped_step_of_rows
+from kinarm.kernels.inverse import orientation_error, take_out_blocked, take_step
 from kinarm.kernels.kinematics import POSE, forward_kinematics, point_jacobian, to_world
 from kinarm.kernels.lanes import LANES, as_numbers, lane_bits, lanes, select
 from kinarm.kernels.records import Fixed, Layout
 from kinarm.kernels.session import ONE, THREE, put, take
+from kinarm.policies.oracle.kernels.rotation import Turn
 
 ITERATIONS = 24
 """Newton steps before a configuration is given up."""
@@ -28,8 +30,9 @@ Moving = Any
 
 
 @cache
-def layout(n_joints: int, n: int) -> Layout:
-    """Configurations in lanes, of which the first n joints move."""
+def layout(n_joints: int, n: int, n_axes: int) -> Layout:
+    """Configurations in lanes, of which the first n joints move, for axes of the tool or none."""
+    rows = Fixed(6 if n_axes > 0 else 3)
     shapes = {
         # Configurations, and their limits [rad or m].
         "q": (ONE, n_joints),
@@ -37,10 +40,14 @@ def layout(n_joints: int, n: int) -> Layout:
         # Goal, distance at which to stop, and distance now [m]; steps so far.
         "goal": (ONE, THREE),
         **dict.fromkeys(("radius", "distance", "iteration"), (ONE,)),
-        # Poses, Jacobian of the tool [m/rad, or m/m], next step [rad or m].
+        # Directions of axes.
+        "wanted": (n_axes, THREE),
+        # Poses, Jacobian of the tool [m/rad, or m/m], next step [rad or m], and space for it.
         "poses": (n_joints + 1, Fixed(POSE)),
-        "jacobian": (THREE, n),
+        "jacobian": (rows, n),
         "step": (n,),
+        "error": (rows,),
+        "square": (Fixed(rows + 1), rows),
     }
     arrays = {name: (lanes, shape) for name, shape in shapes.items()}
     # Rows of the configurations in the lanes.
@@ -81,6 +88,8 @@ def damped_least_squares(
     lower: Array,
     upper: Array,
     goals: Array,
+    turn: Turn,
+    wanted: Array,
     radius: Array,
     configurations: Array,
     distances: Array,
@@ -97,15 +106,18 @@ def damped_least_squares(
         Row of goals and limits for each, and distance at which to stop [m].
     lower, upper, goals : ndarray, shape (n_goals, n) twice and (n_goals, 3)
         Limits of the first n joints, the others stay [rad or m]; goals [m].
+    turn, wanted : Turn, and ndarray, shape (n_goals, n_axes, 3)
+        Axes of the tool, and directions wanted of them. A distance is that of
+        the tool or of its axes, whichever is larger.
     configurations, distances : ndarray, shape (n_rows, n_joints) and (n_rows,)
         Changed: joint positions [rad or m], and distances from tool to goal
         [m].
     """
     tool, rows = chain.tool, moving.rows
     n_joints, aim = configurations.shape[1], moving.goal[0]
-    poses, jacobian, step = moving.poses, moving.jacobian, moving.step
+    poses, jacobian, step, error = moving.poses, moving.jacobian, moving.step, moving.error
     # The numbers in the lanes.
-    radii = as_numbers(moving.radius)
+    radii, directions = as_numbers(moving.radius), as_numbers(moving.wanted)
     found, iterations = as_numbers(moving.distance), as_numbers(moving.iteration)
     waiting, n_moving, free = first, 0, (1 << LANES) - 1
     while True:
@@ -117,6 +129,9 @@ def damped_least_squares(
                 put(lower, goal, moving.lower, 0, lane)
                 put(upper, goal, moving.upper, 0, lane)
                 put(goals, goal, moving.goal, 0, lane)
+                for b in range(directions.shape[0]):
+                    for k in range(3):
+                        directions[b, k, lane] = wanted[goal, b, k]
                 radii[0, lane] = radius[waiting]
                 iterations[0, lane] = 0.0
                 waiting += 1
@@ -129,8 +144,13 @@ def damped_least_squares(
         point = to_world(poses, n_joints, tool[0], tool[1], tool[2])
         x, y, z = aim[0] - point[0], aim[1] - point[1], aim[2] - point[2]
         distance = math.sqrt(x * x + y * y + z * z)
-        moving.distance[0] = distance
-        ended = (distance <= moving.radius[0]) | (moving.iteration[0] >= ITERATIONS)
+        moving.distance[0], apart = distance, distance
+        point_jacobian(chain, poses, point, jacobian)
+        if jacobian.shape[0] > 3:
+            tx, ty, tz = orientation_error(turn.axes, poses, moving.wanted, jacobian)
+            apart = turn.weight * math.sqrt(tx * tx + ty * ty + tz * tz)
+            moving.distance[0] = max(distance, apart)
+        ended = (moving.distance[0] <= moving.radius[0]) | (moving.iteration[0] >= ITERATIONS)
         ended_bits = lane_bits(ended) & ~free
         for lane in range(LANES if ended_bits != 0 else 0):
             if ended_bits >> lane & 1:
@@ -140,10 +160,20 @@ def damped_least_squares(
         free |= ended_bits
         # Aimed at half the radius, a short step still arrives. What has ended stays.
         share = select(ended, 0.0, 1.0 - 0.5 * moving.radius[0] / distance)
-        point_jacobian(chain, poses, point, jacobian)
         limits, blocked = (moving.lower[0], moving.upper[0]), True
+        if jacobian.shape[0] > 3:
+            share, near = max(share, 0.0), max(1.0 - 0.5 * moving.radius[0] / apart, 0.0)
+            near = select(ended, 0.0, turn.weight * near)
+            error[0], error[1], error[2] = share * x, share * y, share * z
+            error[3], error[4], error[5] = near * tx, near * ty, near * tz
+            for i in range(3, 6):
+                for k in range(jacobian.shape[1]):
+                    jacobian[i, k] *= turn.weight
         while blocked:
-            damped_step(jacobian, (share * x, share * y, share * z), step)
+            if jacobian.shape[0] > 3:
+                damped_step_of_rows(jacobian, error, DAMPING + 0.0 * x, moving.square, step)
+            else:
+                damped_step(jacobian, (share * x, share * y, share * z), step)
             blocked = take_out_blocked(moving.q, *limits, step, jacobian)
         take_step(moving.q, *limits, step)
         moving.iteration[0] += 1.0

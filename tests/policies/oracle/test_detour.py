@@ -10,6 +10,7 @@ from kinarm.arm import Arm
 from kinarm.policies.oracle import motion_search
 from kinarm.policies.oracle.inverse import steps_between
 from kinarm.policies.oracle.motion_search import MotionSearch, along_path, find_detour, two_segments
+from kinarm.policies.oracle.stages import Stage
 from kinarm.problem import PROBLEMS
 from kinarm.scene import PAPER_BENCHES, Obstacle, Scene
 from kinarm.simulator import Simulator
@@ -136,7 +137,7 @@ class TestWhatIsTried:
     @pytest.fixture
     def search(self, walled):
         goal = walled.arm.tool_position(END)
-        return MotionSearch(walled, START[None], goal[None])
+        return MotionSearch(walled, START[None], Stage(goal[None]))
 
     def test_without_a_detour_there_is_no_motion(self, search, monkeypatch):
         asked = []

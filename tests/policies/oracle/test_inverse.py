@@ -4,9 +4,11 @@ import itertools
 
 import numpy as np
 import pytest
+from proofs import aims_at
 
 from kinarm.arm import Arm
 from kinarm.errors import InvalidInputError
+from kinarm.kernels.records import recorded
 from kinarm.policies import inverse_kinematics
 from kinarm.policies.oracle.inverse import project, solve_within, step_box, steps_between
 from kinarm.policies.oracle.kernels.projection import damped_least_squares, layout
@@ -206,7 +208,7 @@ class TestProject:
         begun = starts.copy()
         begun[:, :n] = np.clip(begun[:, :n], lower[owner], upper[owner])
         ended, distances = project(
-            simulator, begun, owner, (lower, upper), goals, np.full(100, 0.02)
+            simulator, begun, owner, (lower, upper), aims_at(simulator, goals), np.full(100, 0.02)
         )
         np.testing.assert_array_equal(ended[:, n:], begun[:, n:])
         assert (ended[:, :n] >= lower[owner]).all()
@@ -226,7 +228,8 @@ class TestProject:
         goals = np.array([arm.tool_position(q) for q in rng.uniform(arm.lower, arm.upper, (4, 6))])
         box = tuple(np.tile(limit[:5], (4, 1)) for limit in (arm.lower, arm.upper))
         owner = np.arange(400) % 4
-        _, distances = project(simulator, begun, owner, box, goals, np.full(400, 1e-4))
+        aims = aims_at(simulator, goals)
+        _, distances = project(simulator, begun, owner, box, aims, np.full(400, 1e-4))
         assert (distances <= 1e-4).mean() > 0.5
 
 
@@ -243,26 +246,28 @@ class TestLanes:
         owner = rng.integers(0, 9, 90)
         begun[:, :n] = np.clip(begun[:, :n], box[0][owner], box[1][owner])
         # Some have arrived where they begin, some never do.
-        return begun, owner, box, goals, rng.choice([0.0, 1e-3, 0.05, 5.0], 90)
+        aims = aims_at(simulator, goals)
+        return begun, owner, box, aims, rng.choice([0.0, 1e-3, 0.05, 5.0], 90)
 
     def test_the_company_does_not_matter(self, any_simulator, rows):
-        begun, owner, box, goals, radius = rows
-        ended, distances = project(any_simulator, begun, owner, box, goals, radius)
+        begun, owner, box, aims, radius = rows
+        ended, distances = project(any_simulator, begun, owner, box, aims, radius)
         assert np.isfinite(ended).all()
         assert np.isfinite(distances).all()
         order = np.random.default_rng(21).permutation(90)
         for some in (*np.split(order, [1, 3, 10, 17, 25, 42]), order, np.arange(0)):
-            one, other = project(any_simulator, begun[some], owner[some], box, goals, radius[some])
+            one, other = project(any_simulator, begun[some], owner[some], box, aims, radius[some])
             np.testing.assert_array_equal(one, ended[some])
             np.testing.assert_array_equal(other, distances[some])
 
     def test_other_rows_are_left_alone(self, any_simulator, rows):
-        begun, owner, box, goals, radius = rows
+        begun, owner, box, aims, radius = rows
         ended, distances = begun.copy(), np.full(90, -1.0)
-        chain, moving = any_simulator.world.records[0], layout(begun.shape[1], box[0].shape[1])
-        arrays = (owner, *box, goals, radius, ended, distances)
+        chain, moving = any_simulator.world.records[0], layout(begun.shape[1], box[0].shape[1], 0)
+        aimed = (aims.position, recorded(aims.turn), aims.wanted)
+        arrays = (owner, *box, *aimed, radius, ended, distances)
         damped_least_squares(20, 31, moving.record(), chain, *arrays)
-        expected, away = project(any_simulator, begun, owner, box, goals, radius)
+        expected, away = project(any_simulator, begun, owner, box, aims, radius)
         moved = np.isin(np.arange(90), np.arange(20, 31))
         np.testing.assert_array_equal(ended, np.where(moved[:, None], expected, begun))
         np.testing.assert_array_equal(distances, np.where(moved, away, -1.0))

@@ -1,6 +1,7 @@
 """Bounds over boxes, held against configurations in them; lanes, against numbers."""
 
 import numpy as np
+import pinocchio as pin
 import pytest
 from configurations import random_configurations
 from hanging_chain import LENGTHS, tips
@@ -15,24 +16,37 @@ from kinarm.policies.oracle.kernels.box_proofs import (
     curved_bound,
     joint_bound,
     offset_from_goal,
-    overlaps,
     trim,
+)
+from kinarm.policies.oracle.kernels.contact_proofs import overlaps
+from kinarm.policies.oracle.kernels.rotation import (
+    Turn,
+    angle_bound,
+    axes_jacobian,
+    turn_from_goal,
 )
 
 
 @njit
-def examine(chain, shapes, bounds, goal, cutoff, wanted, q, half, lower, upper, results, work):
+def examine(
+    chain, shapes, bounds, goal, turn, cutoff, wanted, q, half, lower, upper, results, work
+):
     """Distance, bounds, share left, and whether contact is proven, for a box or one in each lane.
 
     The corners are trimmed, and the centre moves to where the linear model is closest to the goal.
     """
-    poses, offset, jacobian, step, scale, slope, least, bend = work
+    poses, offset, jacobian, step, scale, slope, least, bend, spin, turned = work
     results[0] = offset_from_goal(chain, q, goal, poses, offset)
+    if spin.shape[0] > 0:
+        length = turn_from_goal(turn, q.shape[1], poses, turned[0])
+        axes_jacobian(chain, turn, poses, turned[0], spin)
+        results[0] = max(results[0], length)
+        results[5] = angle_bound(turn, length, half)
     tool = (goal[0] + offset[0], goal[1] + offset[1], goal[2] + offset[2])
     point_jacobian(chain, poses, tool, jacobian)
-    direction = closest_step(jacobian, offset, half, step, scale)
-    linear = (poses, jacobian, offset, direction, half)
-    bound = curved_bound(chain, bounds.curvature, *linear, slope, least, bend)
+    direction = closest_step(jacobian, offset, half, step, scale, spin, turned, 0.02)
+    linear = (poses, jacobian, offset, direction, half, slope, least, bend)
+    bound = curved_bound(chain, bounds.curvature, *linear, turn, spin, turned)
     results[1] = bound
     results[2] = joint_bound(bounds, poses, goal, half)
     results[3] = trim(max(bound, cutoff), bound, slope, least, bend, q, half, lower, upper)
@@ -43,15 +57,16 @@ def examine(chain, shapes, bounds, goal, cutoff, wanted, q, half, lower, upper, 
 
 
 @njit
-def examine_lanes(chain, shapes, bounds, goal, cutoff, arrays, work):
+def examine_lanes(chain, shapes, bounds, goal, turn, cutoff, arrays, work):
     q, half, lower, upper, results = arrays
-    poses, offset, jacobian, step, scale, slope, least, bend = work
+    poses, offset, jacobian, step, scale, slope, least, bend, spin, turned = work
     lanes = as_lanes(half)
     examine(
         chain,
         shapes,
         bounds,
         goal,
+        turn,
         cutoff,
         lanes[0] >= 0.0,
         as_lanes(q),
@@ -68,17 +83,25 @@ def examine_lanes(chain, shapes, bounds, goal, cutoff, arrays, work):
             as_lanes(slope),
             as_lanes(least),
             as_lanes(bend),
+            as_lanes(spin),
+            as_lanes(turned),
         ),
     )
 
 
-def work_space(simulator, *lanes):
+def work_space(simulator, *lanes, n_axes=0):
     n, n_joints = simulator.n_actions, simulator.arm.n_joints
     vectors = [np.zeros((n, *lanes)) for _ in range(5)]
     placed = simulator.world.contact_model.shapes.placed
     poses = np.zeros((n_joints + 1 + len(placed), POSE, *lanes))
     poses[n_joints + 1 :].T[...] = placed.T
-    return (poses, np.zeros((3, *lanes)), np.zeros((3, n, *lanes)), *vectors)
+    axes = np.zeros((3 * n_axes, n, *lanes)), np.zeros((3, 3 * n_axes, *lanes))
+    return (poses, np.zeros((3, *lanes)), np.zeros((3, n, *lanes)), *vectors, *axes)
+
+
+def no_turn(n):
+    """A goal without rotations."""
+    return Turn(np.empty((0, 3)), np.empty((0, 3)), 0.0, np.zeros(n))
 
 
 def drawn_boxes(simulator, seed, count):
@@ -92,13 +115,15 @@ def drawn_boxes(simulator, seed, count):
     return centres, halves, goals
 
 
-def examined(simulator, centre, half, goal, cutoff=0.0):
+def examined(simulator, centre, half, goal, cutoff=0.0, turn=None):
     """Results of `examine`, and the corners that are left."""
     chain, n = simulator.arm.chain, simulator.n_actions
+    turn = no_turn(n) if turn is None else turn
     bounds, shapes = MotionBounds.of(chain, n), simulator.world.contact_model.shapes
-    lower, upper, results = centre[:n] - half, centre[:n] + half, np.zeros(5)
-    parts = (centre[None].copy(), half, lower, upper, results, work_space(simulator))
-    examine(chain, shapes, bounds, tuple(goal), cutoff, True, *parts)
+    lower, upper, results = centre[:n] - half, centre[:n] + half, np.zeros(6)
+    space = work_space(simulator, n_axes=len(turn.axes))
+    parts = (centre[None].copy(), half, lower, upper, results, space)
+    examine(chain, shapes, bounds, tuple(goal), turn, cutoff, True, *parts)
     return results, lower, upper
 
 
@@ -195,6 +220,78 @@ class TestBounds:
         assert cut > 50
 
 
+class TestRotations:
+    """With axes of the tool, the larger one of two lengths is bounded."""
+
+    WEIGHT = 0.3
+
+    def turn(self, simulator, n_axes, rng):
+        """Any axes in the last frame, and any directions wanted of them."""
+        axes, wanted = (pin.exp3(3 * rng.normal(size=3)).T[:n_axes].copy() for _ in range(2))
+        turning = np.where(simulator.arm.chain.prismatic, 0.0, self.WEIGHT)
+        return Turn(axes, wanted, self.WEIGHT, turning[: simulator.n_actions])
+
+    def lengths(self, simulator, configurations, goal, turn):
+        """By Pinocchio: of the tool's offset, and of angles by their chord."""
+        model, data = simulator.arm.model, simulator.arm.model.createData()
+        found = []
+        for q in configurations:
+            pin.forwardKinematics(model, data, q)
+            reached = turn.axes @ data.oMi[model.njoints - 1].rotation.T
+            angle = np.arccos(np.clip(reached[0] @ turn.wanted[0], -1, 1))
+            if len(turn.axes) == 3:
+                angle = np.linalg.norm(pin.log3(reached.T @ turn.wanted))
+            found.append(2 * self.WEIGHT * np.sin(angle / 2))
+        return np.fmax(distances(simulator, configurations, goal), found)
+
+    @pytest.mark.parametrize("n_axes", [1, 3])
+    def test_no_configuration_is_closer(self, any_simulator, n_axes):
+        simulator, rng = any_simulator, np.random.default_rng(11)
+        positive, n = np.zeros(2), simulator.n_actions
+        for centre, half, goal in zip(*drawn_boxes(simulator, 12, 80), strict=True):
+            turn = self.turn(simulator, n_axes, rng)
+            cutoff = 10.0 ** rng.uniform(-3, 0)
+            results, lower, upper = examined(simulator, centre, half, goal, cutoff, turn)
+            drawn = within(centre[:n] - half, centre[:n] + half, centre, rng, 60)
+            away = self.lengths(simulator, np.vstack([centre, drawn]), goal, turn)
+            assert results[0] == pytest.approx(away[0], abs=1e-7)
+            assert results[1] <= away.min() + 1e-7
+            assert results[5] <= away.min() + 1e-7
+            kept = ((drawn[:, :n] >= lower - 1e-9) & (drawn[:, :n] <= upper + 1e-9)).all(axis=1)
+            assert (away[1:][~kept] > max(results[1], cutoff) - 1e-7).all()
+            positive += results[[1, 5]] > 0
+        assert (positive > 20).all()
+
+    def test_the_angle_less_the_half_widths_is_attained(self, hanging):
+        # Three parallel axes turn the last link towards where it is wanted, or away.
+        simulator, half = hanging(), np.array([0.0, 0.1, 0.2, 0.05])
+        centre, axes = np.array([2.0, 0, 0, 0]), np.array([[0.0, 0.0, 1.0]])
+        axis = simulator.arm.chain.axis[-1]
+        axes = np.cross(axis, [[0.3, 0.5, 0.7]])
+        axes /= np.linalg.norm(axes)
+        for sign in (-1, 1):
+            model, data = simulator.arm.model, simulator.arm.model.createData()
+            pin.forwardKinematics(model, data, centre)
+            turned = data.oMi[model.njoints - 1].rotation @ pin.exp3(sign * axis)
+            turn = Turn(axes, axes @ turned.T, 1.0, np.array([0.0, 1.0, 1.0, 1.0]))
+            bound = examined(simulator, centre, half, np.array([0, 0, 1.0]), turn=turn)[0][5]
+            assert bound == pytest.approx(2 * np.sin((1 - 0.35) / 2), abs=1e-9)
+
+    @pytest.mark.parametrize("n_axes", [1, 3])
+    def test_small_boxes_are_bounded_to_third_order(self, simulator, n_axes):
+        # Goals at the tool and opposite rotations: what is lost shrinks with the cube of the width.
+        rng, lost = np.random.default_rng(13), []
+        for width in (0.02, 0.002):
+            turn = self.turn(simulator, n_axes, rng)
+            centre = random_configurations(simulator, rng, 1)[0]
+            half, goal = width * rng.random(5), simulator.arm.tool_position(centre)
+            bound = examined(simulator, centre, half, goal, np.inf, turn)[0][1]
+            drawn = within(centre[:5] - half, centre[:5] + half, centre, rng, 3000)
+            lost.append(self.lengths(simulator, drawn, goal, turn).min() - bound)
+        assert -1e-7 < lost[0] < 2e-3
+        assert -1e-7 < lost[1] < 2e-4
+
+
 class TestLanes:
     def test_have_the_bits_of_numbers(self, any_simulator):
         simulator, n = any_simulator, any_simulator.n_actions
@@ -205,11 +302,10 @@ class TestLanes:
         for first in range(0, len(centres), LANES):
             some, goal = slice(first, first + LANES), goals[first]
             q, half = centres[some].T[None].copy(), halves[some].T.copy()
-            lower, upper, results = q[0, :n] - half, q[0, :n] + half, np.zeros((5, LANES))
+            lower, upper, results = q[0, :n] - half, q[0, :n] + half, np.zeros((6, LANES))
             arrays = (q, half, lower, upper, results)
-            examine_lanes(
-                chain, shapes, bounds, tuple(goal), 0.1, arrays, work_space(simulator, LANES)
-            )
+            turn, space = no_turn(n), work_space(simulator, LANES)
+            examine_lanes(chain, shapes, bounds, tuple(goal), turn, 0.1, arrays, space)
             for lane in range(LANES):
                 row = first + lane
                 alone = examined(simulator, centres[row], halves[row], goal, 0.1)

@@ -9,7 +9,7 @@ from numba import njit
 
 from kinarm.kernels.kinematics import POSE, forward_kinematics, place_bodies
 from kinarm.kernels.planes import DEPTH
-from kinarm.policies.oracle.kernels.box_proofs import overlaps
+from kinarm.policies.oracle.kernels.contact_proofs import overlaps
 from kinarm.scene import Obstacle
 
 CAPSULE_ARMS = ("lrmate200ic_5l", "paper", "paper_flange")
