@@ -62,7 +62,7 @@ def measure(policy_name: str, repetitions: int, *, ppo: bool = False) -> dict[st
     problem = policy.problem
     simulator, few = Simulator(problem), min(repetitions, SLOW_REPETITIONS)
     rollouts = [
-        row for size in BATCHES for row in measure_rollouts(simulator, policy, size, repetitions)
+        row for size in BATCHES for row in _measure_rollouts(simulator, policy, size, repetitions)
     ]
     reference = timed(lambda: reference_steps(simulator, policy), repetitions)
     fast = [row for row in rollouts if row["batch"] == HEADLINE_BATCH][-1]
@@ -76,8 +76,8 @@ def measure(policy_name: str, repetitions: int, *, ppo: bool = False) -> dict[st
         "rollouts": rollouts,
         "reference": reference,
         "speed_up_over_reference": fast["steps_per_second"]["median"] / reference["median"],
-        "vector_environment": measure_env(vector, (VECTOR_STEPS, VECTOR_ENVS), repetitions),
-        "single_environment": measure_env(single, (SINGLE_STEPS,), repetitions),
+        "vector_environment": _measure_env(vector, (VECTOR_STEPS, VECTOR_ENVS), repetitions),
+        "single_environment": _measure_env(single, (SINGLE_STEPS,), repetitions),
         "table_1_training": measure_training(problem, few),
         "oracle": {
             "trials": ORACLE_TRIALS,
@@ -88,18 +88,10 @@ def measure(policy_name: str, repetitions: int, *, ppo: bool = False) -> dict[st
     return {**document, "ppo_training": measure_ppo(problem)} if ppo else document
 
 
-def measure_rollouts(
+def _measure_rollouts(
     simulator: Simulator, policy: Policy, batch: int, repetitions: int
 ) -> list[dict[str, Any]]:
-    """Steps per second of episodes: random and trained, on one and all threads.
-
-    Parameters
-    ----------
-    simulator, policy : Simulator, Policy
-        What to step, and the trained policy.
-    batch, repetitions : int
-        How many episodes, and how often.
-    """
+    """Steps per second of a batch of episodes: random and trained, on one and all threads."""
     rng = np.random.default_rng(batch)
     starts, goals = simulator.sample(rng, batch)
     actions = rng.uniform(-1, 1, (batch, simulator.task.horizon, simulator.n_actions))
@@ -128,17 +120,12 @@ def reference_steps(simulator: Simulator, policy: Policy) -> int:
     return sum(len(episode.rewards) for episode in episodes)
 
 
-def measure_env(
+def _measure_env(
     env: ReachEnv | ReachVectorEnv, shape: tuple[int, ...], repetitions: int
 ) -> dict[str, float]:
     """Steps per second of all arms of an environment, on random actions.
 
-    Parameters
-    ----------
-    env, repetitions : ReachEnv or ReachVectorEnv, int
-        What to step, and how often to measure.
-    shape : tuple of int
-        Steps of a measurement, and the number of arms of a vector environment.
+    The shape has the steps of a measurement, and the number of arms of a vector environment.
     """
     env.reset(seed=0)
     actions = np.random.default_rng(0).uniform(-1, 1, (*shape, env.simulator.n_actions))

@@ -29,14 +29,9 @@ NUMBERS_AT_ONCE = 400_000
 def estimate_metrics(outcomes: Outcomes, less: Outcomes | None = None) -> dict[str, Estimate]:
     """Compute all `METRICS` with intervals; unknown figures stay empty.
 
-    Intervals are about other trials, and with several training seeds also about other trainings.
-
-    Parameters
-    ----------
-    outcomes : Outcomes
-        Of one policy, or of the seeds of a recipe.
-    less : Outcomes, optional
-        Of another in the same trials, whose figures are subtracted.
+    Outcomes are of one policy, or of the seeds of a recipe; the figures of others in the same
+    trials, ``less``, are subtracted. Intervals are about other trials, and with several training
+    seeds also about other trainings.
     """
     sides = (outcomes,) if less is None else (outcomes, less)
     known = {

@@ -45,19 +45,11 @@ def add_options(
     dashes, of a positional argument), ``bare`` (values are also taken without
     the option), ``metavar``, ``repeat`` (repetitions of the option give a
     tuple, else its several values), ``parse`` (makes the value of the text),
-    ``names`` (lists names for help and completion) and ``completes`` (lists
-    them for completion alone).
+    ``names`` (lists names for help and completion; those given here come first)
+    and ``completes`` (lists them for completion alone).
 
-    Parameters
-    ----------
-    parser, kind
-        Where to add them, and the dataclass.
-    skip : collection of str
-        Fields without an option.
-    explicit : bool
-        Say every default, and let what is false by default have ``--no-x``.
-    names : mapping, optional
-        Names for options, by field, if the metadata list none.
+    With ``explicit``, help says every default, and what is false by default has
+    ``--no-x``. Fields to ``skip`` get no option.
     """
     groups: Mapping[str, str] = getattr(kind, "GROUPS", {})
     titles = {name: title for title, members in groups.items() for name in members.split()}
@@ -276,16 +268,8 @@ def run_request(
 ) -> NoReturn:
     """Run a command line whose options are the fields of a request; see `run_command`.
 
-    Parameters
-    ----------
-    prog, kind
-        The command, and its request, a dataclass whose first line describes it.
-    report : callable
-        Runs a request, and prints; its second argument is the command as typed.
-    arguments : sequence of str, optional
-        Typed words; this process's by default.
-    skip
-        Fields without an option.
+    The first line of the request's class describes the command. ``report`` runs a request and
+    prints; it also gets the command as typed, by default in this process.
     """
     typed = sys.argv[1:] if arguments is None else arguments
     parser = Parser(prog=prog, description=_first_line(kind))
@@ -297,20 +281,9 @@ def run_request(
 
 
 def run_commands(
-    prog: str,
-    description: str,
-    commands: Commands,
-    arguments: Sequence[str] | None = None,
+    prog: str, description: str, commands: Commands, arguments: Sequence[str] | None = None
 ) -> NoReturn:
-    """Run a command line whose first word is a command, the first one by default.
-
-    Parameters
-    ----------
-    prog, description, arguments
-        As for `run_request`; the description says what the program is for.
-    commands : mapping
-        See `Commands`.
-    """
+    """Run a command line whose first word is a command, the first one by default."""
     parser = Parser(prog=prog, description=description)
     parsers = parser.add_commands("command")
     for name, (kind, _) in commands.items():

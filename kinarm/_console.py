@@ -136,15 +136,7 @@ class ProgressLine:
             self._progress.stop()
 
     def update(self, done: float | None = None, words: Sequence[str] = ()) -> None:
-        """Show how far it is.
-
-        Parameters
-        ----------
-        done : float, optional
-            How much is done; unchanged by default.
-        words : sequence of str
-            Texts at the line's end, most important first.
-        """
+        """Show how much is done, by default as before; words end the line, important ones first."""
         self._progress.update(self._task, completed=done)
         task = self._progress.tasks[0]
         count = f"{int(task.completed)}/{task.total:.0f}"

@@ -76,15 +76,7 @@ def _toml_entries(text: str) -> dict[str, Any]:
 
 
 def take_base(entries: dict[str, Any], where: str, bases: Collection[str], default: str) -> str:
-    """Remove the entry ``base`` of a file, and return it or the default.
-
-    Parameters
-    ----------
-    entries, where
-        Entries of the file, and its name.
-    bases, default
-        Possible values, one of which is the default.
-    """
+    """Remove the entry ``base`` of a file, one of the bases, and return it or the default."""
     base = entries.pop("base", default)
     if not isinstance(base, str) or base not in bases:
         raise InvalidInputError(f"{where}: base must be one of {', '.join(bases)}, got {base!r}")
@@ -94,16 +86,8 @@ def take_base(entries: dict[str, Any], where: str, bases: Collection[str], defau
 def from_plain(kind: type[T], entries: object, where: str, path: str = "") -> T:
     """Build a dataclass from plain values by field names.
 
-    What is unknown, missing, of the wrong type or refused is an
-    `InvalidInputError` of one line.
-
-    Parameters
-    ----------
-    kind, entries
-        The dataclass, and plain values.
-    where, path : str
-        Names of their source, and of the tables around them, such as
-        ``"scene."``.
+    What is unknown, missing, of the wrong type or refused is an `InvalidInputError` of one line,
+    with the source, ``where``, and the path of tables around the values, such as ``"scene."``.
     """
     if not isinstance(entries, Mapping):
         table = path.removesuffix(".") or "it"

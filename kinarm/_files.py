@@ -136,14 +136,9 @@ def shipped_files(folder: str, suffix: str = ".toml") -> Mapping[str, Path]:
 
 
 def named_file(what: str, name: str | Path, others: Iterable[str] = ()) -> Path:
-    """File of what ships with kinarm, or a path that looks like one.
+    """File of what ships with kinarm, such as a ``"scene"``, or a path that looks like one.
 
-    Parameters
-    ----------
-    what, name
-        Its kind, such as ``"scene"``, and its name or path.
-    others : iterable of str
-        Further names, for the message of UnknownNameError.
+    The message about an unknown name lists the others as well.
     """
     shipped, path = shipped_files(f"{what}s"), Path(name)
     if str(name) in shipped:
@@ -165,15 +160,7 @@ def first_line(error: BaseException) -> str:
 
 
 def check_output(path: str | Path, *, overwrite: bool = False, suffix: str = "") -> None:
-    """Make a file's folder, and see that the file can be written, before any work.
-
-    Parameters
-    ----------
-    path, overwrite
-        The file, and whether it may exist.
-    suffix : str
-        Required ending of its name.
-    """
+    """Make a file's folder, and see that the file can be written, before any work."""
     file = Path(path)
     with _reported(path):
         is_folder, exists = file.is_dir(), file.exists()
@@ -211,19 +198,7 @@ def save_archive(
     *,
     compress: bool = False,
 ) -> None:
-    """Write a ``.npz`` file with arrays and a header.
-
-    Parameters
-    ----------
-    file : str, Path or binary file
-        The file.
-    kind, version
-        What it holds, such as ``"policy"``, and version of the format.
-    arrays, header : mapping
-        Arrays by name, and the rest for JSON.
-    compress : bool
-        Whether arrays are compressed.
-    """
+    """Write a ``.npz`` file of a kind, such as ``"policy"``: arrays, and a header for JSON."""
     content: dict[str, Any] = {
         "format": np.array(f"kinarm-{kind.replace(' ', '-')}"),
         "version": np.array(version),
@@ -247,14 +222,7 @@ def load_archive(
 ) -> Archive:
     """Read what `save_archive` wrote, or refuse the file in one line.
 
-    Parameters
-    ----------
-    path, kind, version
-        The file, what it has to hold, and its required version.
-    error : type
-        Type of the errors.
-    unless : tuple of str
-        Beginnings of names of arrays to leave out.
+    Arrays are left out whose names begin with one of ``unless``.
     """
     name, wanted = repr(str(path)), f"kinarm-{kind.replace(' ', '-')}"
     with reading(name, kind, error), Path(path).open("rb") as file:
@@ -287,16 +255,9 @@ def load_archive(
 def reading(
     name: str, kind: str, error: type[KinarmError], *, of: str = "kinarm"
 ) -> Iterator[None]:
-    """Turn any error of reading a damaged file into one line.
+    """Turn any error of reading a damaged file into one line; those of its type pass as they are.
 
-    Parameters
-    ----------
-    name, kind
-        Name of the file, quoted, and what it holds.
-    error : type
-        Type of the errors; those of this type pass as they are.
-    of : str
-        Whose file it is.
+    The line has the file's name, which is quoted already, its kind, and whose file it is.
     """
     try:
         yield
@@ -319,16 +280,8 @@ def cached_arrays(
 ) -> Arrays:
     """Look arrays up in the cache, or make and keep them.
 
-    A damaged file is replaced; what cannot be written is not kept.
-
-    Parameters
-    ----------
-    kind, version
-        A word for them; the version is raised when they change.
-    made_of : bytes
-        All that they depend on.
-    make : callable
-        Makes them.
+    They depend on what they are ``made_of`` alone; the version is raised when they change. A file
+    that is damaged is replaced; what cannot be written is not kept.
     """
     path = cache_folder() / f"{kind}-{hashlib.sha256(made_of).hexdigest()[:24]}.npz"
     with suppress(InvalidInputError):

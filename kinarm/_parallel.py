@@ -32,18 +32,8 @@ def run_rows(
 ) -> int:
     """Call ``kernel(first, last, *arrays)`` for ranges that cover n rows; add up the results.
 
-    Neither threads nor ranges change results. Kernels release the GIL.
-
-    Parameters
-    ----------
-    kernel, n
-        Works on the rows of a range, of so many rows.
-    work : int
-        Estimated work [episode steps]; the calling thread does little alone.
-    threads : int
-        Threads at most.
-    *arrays
-        Passed on to the kernel.
+    Neither threads, at most so many, nor ranges change results. Kernels release the GIL. By the
+    estimated work [episode steps], the calling thread does little alone.
     """
     if threads == 1 or n == 0 or work < PARALLEL_STEPS:
         return kernel(0, n, *arrays) or 0
@@ -61,21 +51,9 @@ def run_together(
 ) -> int:
     """Call ``kernel(counters, given(thread), *arrays)`` on several threads; add up the results.
 
-    By a counter, zero at first, kernels share the rows. The calling thread is
-    number 0. If it hears of interruptions, it waits where the work is long, and
-    they end it after the rows under way. A thread that comes too late is not
-    awaited.
-
-    Parameters
-    ----------
-    kernel : callable
-        Works on rows as long as there are any.
-    work, threads
-        As for `run_rows`.
-    given : callable
-        Second argument of the kernel, by thread.
-    *arrays
-        Passed on to the kernel.
+    By a counter, zero at first, kernels share the rows as long as there are any. The calling thread
+    is number 0. If it hears of interruptions, it waits where the work is long (see `run_rows`), and
+    they end it after the rows under way. A thread that comes too late is not awaited.
     """
     counters = np.zeros(1, dtype=np.int64)
     waits = work > LONG_STEPS and current_thread() is main_thread()

@@ -174,16 +174,10 @@ def print_columns(
     whole: bool = False,
     advice: str = "a wider terminal, or COLUMNS=250, shows them",
 ) -> None:
-    """Print a table: headings and words wrap; columns without room are left out and named.
+    """Print a table: headings and words wrap; an empty line separates groups of rows.
 
-    Parameters
-    ----------
-    columns, groups
-        The columns, and the rows in groups that an empty line separates.
-    console, advice
-        Where to print it, and how to see what is left out.
-    whole : bool
-        Leave nothing out, however wide the table is.
+    Columns without room are left out and named, with advice on how to see them; or, if the table is
+    wanted whole, none, however wide it is.
     """
     rows = [row for group in groups for row in (None, *group)][1:]
     shown = [
@@ -245,15 +239,7 @@ def _table(columns: Sequence[_Filled], **style: Any) -> "Table":
 def print_table(
     headings: Sequence[str], rows: Sequence[Sequence[str]], expendable: Sequence[str] = ()
 ) -> None:
-    """Print a table of texts on standard output.
-
-    Parameters
-    ----------
-    headings, rows
-        Texts of the headings, and of each row.
-    expendable : sequence of str
-        Headings to leave out, in this order, in narrow terminals.
-    """
+    """Print a table of texts; narrow terminals leave out what is expendable, in this order."""
     columns = [
         Column[Sequence[str]](
             heading,

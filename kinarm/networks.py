@@ -185,13 +185,8 @@ class Networks:
 def split_parameters(parameters: Array, widths: Sequence[int]) -> Iterator[Layer]:
     """Views of the layers of networks, whose parameters kernels read in this order.
 
-    Each layer's weights come input by input, then its bias.
-
-    Parameters
-    ----------
-    parameters : ndarray, shape (n_networks, n_parameters)
-    widths : sequence of int
-        From the observation to the action.
+    Each layer's weights come input by input, then its bias. The parameters have the shape
+    (n_networks, n_parameters); widths go from the observation to the action.
     """
     start = 0
     for n_in, n_out in pairwise(widths):

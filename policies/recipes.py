@@ -92,7 +92,7 @@ def shipped_learner(name: str, config: type[ConfigT], **parts: Any) -> Learner[C
     """A learner of kinarm, with the recipes of its file in ``data/recipes``.
 
     A recipe has a ``summary``, settings that replace those of its ``base``, and
-    maybe others ``where_regions_differ``; see `adapted`.
+    maybe others ``where_regions_differ``; see `_adapted`.
 
     Parameters
     ----------
@@ -114,24 +114,17 @@ def shipped_learner(name: str, config: type[ConfigT], **parts: Any) -> Learner[C
         config=config,
         recipes=recipes,
         summaries=summaries,
-        adapt=lambda made: adapted(made, apart),
+        adapt=lambda made: _adapted(made, apart),
         **parts,
     )
 
 
-def adapted(config: ConfigT, apart: Mapping[str, ConfigT]) -> ConfigT:
+def _adapted(config: ConfigT, apart: Mapping[str, ConfigT]) -> ConfigT:
     """Adapt a recipe to its problem, if it is symmetric.
 
-    Progress is rewarded in proportion to the arm's reach, and training
-    tolerances are shares of the task's.
-
-    Parameters
-    ----------
-    config : TrainingConfig
-        The recipe, with problem and seed.
-    apart : mapping of str to TrainingConfig
-        What replaces it where several regions are to be reached that no
-        reflection joins.
+    Progress is rewarded in proportion to the arm's reach, and training tolerances are shares of the
+    task's. A recipe of ``apart`` replaces it where several regions are to be reached that no
+    reflection joins.
     """
     if not getattr(config, "symmetric", False):
         return config

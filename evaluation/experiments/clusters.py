@@ -39,20 +39,10 @@ def identity() -> dict[str, str]:
     return {**package_versions(), **results, "source of kinarm": source.hexdigest()[:12]}
 
 
-def do_alike(work: Callable[[Any], Any], expected: Mapping[str, str], task: Any) -> Any:
-    """Do the work for a task if all versions are those of the driver.
+def _do_alike(work: Callable[[Any], Any], expected: Mapping[str, str], task: Any) -> Any:
+    """Do the work for a task if the driver's `identity` is the one here.
 
-    Parameters
-    ----------
-    work, expected : callable and mapping
-        The work, and the driver's `identity`.
-    task : object
-        The task.
-
-    Raises
-    ------
-    WorkerError
-        Names the first difference.
+    Else a `WorkerError` names the first difference.
     """
     here = identity()
     for name, wanted in expected.items():
@@ -108,7 +98,7 @@ class RayExecutor:
         waiting, under_way = iter(tasks), dict[Any, Any]()
         try:
             remote: Any = ray.remote(num_cpus=self.threads, max_retries=RETRIES)(attempt)
-            shared = ray.put(partial(do_alike, work, identity()))
+            shared = ray.put(partial(_do_alike, work, identity()))
             while True:
                 for task in islice(waiting, AT_ONCE - len(under_way)):
                     under_way[remote.remote(shared, pickle.dumps(task))] = task
@@ -189,7 +179,7 @@ class SlurmExecutor:
         except ImportError as error:
             raise MissingExtraError("submitit", "slurm") from error
         parts = [tasks[k : k + self.bundle] for k in range(0, len(tasks), self.bundle)]
-        alike, jobs = partial(do_alike, work, identity()), list[Any]()
+        alike, jobs = partial(_do_alike, work, identity()), list[Any]()
         if not parts:
             return
         try:

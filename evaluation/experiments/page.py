@@ -91,17 +91,7 @@ def results_document(study: "Study", command: str) -> dict[str, Any]:
 
 
 def _page(name: str, study: "Study", document: dict[str, Any], drawings: Mapping[str, str]) -> str:
-    """A page that fetches nothing; equal input gives equal text.
-
-    Parameters
-    ----------
-    name : str
-        Name of its template.
-    study, document : Study and dict
-        The study, its settings and results.
-    drawings : mapping of str to str
-        Figures as SVG, by name.
-    """
+    """A page that fetches nothing, by its template; equal input gives equal text."""
     environment = template_environment(autoescape=name.endswith(".html"))
     experiment, groups = study.experiment, study.best(len(study))
     best: dict[str, Group] = {}

@@ -74,22 +74,13 @@ class HtmlPage:
         return NOTEBOOK_FRAME.format(self.html, type(self).__name__, NOTEBOOK_HEIGHT)
 
 
-def page_html(
+def _page_html(
     template: str, title: str, scene: bytes, data: Mapping[str, Any], parts: Sequence[str]
 ) -> str:
-    """Fill a template.
+    """Fill a template, which extends ``page.html`` and has a style of its name.
 
-    Parameters
-    ----------
-    template, title
-        Name of the template, which extends ``page.html``, and of its style; the
-        page's title.
-    scene : bytes
-        Framed commands to Meshcat's viewer.
-    data : mapping
-        What the scripts have to know, for JSON.
-    parts : sequence of str
-        Scripts, after those of every page.
+    The scene is framed commands to Meshcat's viewer, the data are what scripts have to know. Parts
+    are the scripts after those of every page.
     """
     described = json.dumps(data, separators=(",", ":"), sort_keys=True)
     environment = Environment(
@@ -210,7 +201,7 @@ def replay_page(
     }
     title = f"{' and '.join(policies)} · kinarm replay"
     scripts = ("replay_stage", "trial_list", "player")
-    page = ReplayPage(page_html("player", title, drawn.content, data, scripts))
+    page = ReplayPage(_page_html("player", title, drawn.content, data, scripts))
     if path is not None:
         page.save(path)
     return page
@@ -347,7 +338,7 @@ def arm_page(
     }
     data["scale"] *= NEARER
     title = f"{arm.name} · kinarm arm"
-    page = ArmPage(page_html("arm_page", title, drawn.content, data, ("contact", "arm_page")))
+    page = ArmPage(_page_html("arm_page", title, drawn.content, data, ("contact", "arm_page")))
     if path is not None:
         page.save(path)
     return page

@@ -52,22 +52,12 @@ ROUNDING = 1e-5
 def policy_from_sb3(
     kind: "type[Policy]", given: Any, problem: ProblemLike | None, vec_normalize: Any
 ) -> "Policy":
-    """Convert a model; see `Policy.from_sb3`.
+    """Convert a model or its file to a `Policy`, given as ``kind``.
 
     Parameters
     ----------
-    kind : type
-        `Policy`.
-    given : BaseAlgorithm, SB3Model, str or Path
-        The model, or its file.
-    problem, vec_normalize
-        The problem of the policy, and the ``VecNormalize`` of its observations,
-        or its file; None for those of the model's environment.
-
-    Raises
-    ------
-    KinarmError
-        If it cannot be converted, or a file cannot be read.
+    kind, given, problem, vec_normalize
+        See `Policy.from_sb3`; the model may be an `SB3Model`, too.
     """
     model = sb3_model(given)
     if model.remembers:
@@ -79,7 +69,7 @@ def policy_from_sb3(
     if own is None:
         raise InvalidInputError(NO_PROBLEM)
     simulator = Simulator(own, threads=1)
-    interface, selection, sizes = model_inputs(model.policy, simulator)
+    interface, selection, sizes = _model_inputs(model.policy, simulator)
     statistics, origin = _statistics_of(model, vec_normalize, simulator.world.layout)
     model.policy.set_training_mode(False)
     config = {
@@ -181,16 +171,11 @@ def native_statistics(
     return _statistics_of(model, vec_normalize, None if wrapped else simulator.world.layout)
 
 
-def model_inputs(policy: Any, simulator: Simulator) -> tuple[Interface, Layer, dict[str, int]]:
+def _model_inputs(policy: Any, simulator: Simulator) -> tuple[Interface, Layer, dict[str, int]]:
     """Find out how a features extractor puts its inputs together.
 
-    Returned are the interface of the model's environment, the map from the flat
-    observation to the inputs, and the sizes of their parts in order.
-
-    Raises
-    ------
-    InvalidInputError
-        If it computes features, or observations or actions are not the arm's.
+    Returned are the interface of the model's environment, the map from the flat observation to the
+    inputs, and the sizes of their parts in order.
     """
     _check_actions(policy.action_space, simulator)
     actor = getattr(policy, "actor", None)

@@ -53,12 +53,8 @@ def split_parameters(vector: Vector, widths: Sequence[int]) -> Parameters:
 
     Standard deviations come first, and weights before biases.
 
-    Parameters
-    ----------
-    vector : ndarray, shape (n_parameters,)
-        All parameters.
-    widths : sequence of int
-        Widths of the actor's layers, from the observation to the action.
+    It holds all parameters, shape (n_parameters,); widths are those of the actor's layers, from the
+    observation to the action.
     """
     shapes = _shapes(widths)
     sizes = [widths[-1], *(size for n_in, n_out in shapes for size in (n_in * n_out, n_out))]

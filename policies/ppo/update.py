@@ -86,7 +86,7 @@ def update(
             standard = standardisation(chosen, experience.advantages)
             arrays = (experience, chosen, objective, standard, gradients, losses)
             nets = (networks.actor, networks.critic)
-            find_gradients(threads, *nets, *arrays)
+            _find_gradients(threads, *nets, *arrays)
             records.append((*losses.sum(axis=0) * objective.share, networks.log_std.mean()))
             descend(*nets, *moments, gradients, descent, steps_before + len(records))
     return UpdateRecords(*np.array(records).T)
@@ -122,18 +122,11 @@ def logged(
     }
 
 
-def find_gradients(threads: int, *given: Any) -> None:
+def _find_gradients(threads: int, *given: Any) -> None:
     """Call ``add_gradients(part, part + 1, *given)`` for `PARTS` parts, on threads.
 
-    The calling thread works, too, and does not wait for one that has not begun:
-    processors may be busy.
-
-    Parameters
-    ----------
-    threads : int
-        Threads at most.
-    *given
-        Passed on to the kernel.
+    The calling thread works, too, and does not wait for one that has not begun: processors may be
+    busy.
     """
     if threads == 1:
         add_gradients(0, PARTS, *given)
@@ -193,7 +186,7 @@ def imitate(
         for number, chosen in enumerate(np.array_split(rng.permutation(len(seen)), batches)):
             objective = Objective(0.0, 0.0, 0.0, 1.0 / (len(chosen) * n_actions), imitating=True)
             arrays = (experience, chosen, objective, (0.0, 1.0), gradients, losses)
-            find_gradients(threads, *nets, *arrays)
+            _find_gradients(threads, *nets, *arrays)
             done = (epoch * batches + number) / (EPOCHS * batches)
             descent = Descent(LEARNING_RATE * (1 - done), 0.9, 0.999, 1e-8, 1e9)
             descend(*nets, *moments, gradients, descent, epoch * batches + number + 1)

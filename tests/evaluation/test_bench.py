@@ -36,7 +36,7 @@ def test_the_first_run_is_not_counted(monkeypatch):
 def test_measured_steps_are_steps_taken(counted, train_novice):
     """The rate of trained rollouts counts the steps of the episodes, not their horizon."""
     simulator, policy = Simulator("right", threads=1), train_novice("right")
-    rows = bench.measure_rollouts(simulator, policy, 32, 1)
+    rows = bench._measure_rollouts(simulator, policy, 32, 1)
     starts, goals = simulator.sample(np.random.default_rng(32), 32)
     steps = int(simulator.rollout(policy, starts, goals).steps.sum())
     assert steps < 32 * 64
@@ -48,7 +48,7 @@ def test_measured_steps_are_steps_taken(counted, train_novice):
 
 
 def test_the_batch_environment_is_measured_with_all_its_arms(counted):
-    bench.measure_env(ReachVectorEnv(64, "right"), (200, 64), 1)
+    bench._measure_env(ReachVectorEnv(64, "right"), (200, 64), 1)
     assert counted == [64 * 200]
 
 

@@ -18,7 +18,7 @@ from small_tasks import (
 from kinarm.errors import InvalidInputError, WorkerError
 from kinarm.evaluation.commands.study import RunningOptions, StudyRequest
 from kinarm.evaluation.experiments import clusters, executors
-from kinarm.evaluation.experiments.clusters import RayExecutor, SlurmExecutor, do_alike
+from kinarm.evaluation.experiments.clusters import RayExecutor, SlurmExecutor, _do_alike
 from kinarm.evaluation.experiments.executors import Failure, LocalExecutor
 
 NOBODY = "127.0.0.1:9"
@@ -67,7 +67,7 @@ def test_nothing_to_do(executor):
 
 
 def test_work_of_another_kinarm_is_refused():
-    work = partial(do_alike, square, {**clusters.identity(), "coal": "0.0.1"})
+    work = partial(_do_alike, square, {**clusters.identity(), "coal": "0.0.1"})
     ((_, failure),) = LocalExecutor(1).map(work, [1])
     assert failure.error.startswith("a worker differs from this process: coal is ")
     assert failure.error.endswith(" there, 0.0.1 here")
