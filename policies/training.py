@@ -3,8 +3,6 @@
 Policy, learning curve and, until the end, checkpoint lie side by side.
 """
 
-import csv
-import io
 import sys
 import time
 from collections.abc import Sequence
@@ -15,6 +13,7 @@ from typing import Any, ClassVar
 from kinarm._console import ProgressLine, told_of_activities
 from kinarm._files import check_output, only_writer, write_text
 from kinarm._interrupts import telling
+from kinarm._tables import csv_text
 from kinarm.errors import FROM_ZERO, InvalidInputError, KinarmError, PolicyFileError
 from kinarm.policies.checkpoint import (
     CHECKPOINT_SECONDS,
@@ -50,11 +49,8 @@ def curve_path(out: str | Path) -> Path:
 
 def write_curve(path: Path, curve: Sequence[CurvePoint]) -> None:
     """Write a learning curve as CSV, one line per iteration."""
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(("iteration", *CurvePoint._fields))
-    writer.writerows((number, *point) for number, point in enumerate(curve, start=1))
-    write_text(path, text.getvalue())
+    points = enumerate(curve, start=1)
+    write_text(path, csv_text([{"iteration": n, **point._asdict()} for n, point in points]))
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -29,11 +29,6 @@ if TYPE_CHECKING:
 LINES = 8
 """Most groups that a figure shows of a problem, the best ones."""
 
-TITLES = {
-    "learning_curves": "Learning curves",
-    "effects": "Effects",
-}
-
 
 def write_all(study: "Study", command: str = "") -> Path:
     """Write the results of a study, and return the page.
@@ -106,7 +101,10 @@ def _page(name: str, study: "Study", document: dict[str, Any], drawings: Mapping
         headings=[column.heading for column in table.COLUMNS],
         rows=[table.group_row(group) for group in groups],
         rows_in_order=[table.group_row(group) for group in study.groups()],
-        figures=[(name, TITLES[name], d[d.index("<svg") :]) for name, d in drawings.items()],
+        figures=[
+            (name, name.replace("_", " ").capitalize(), drawing[drawing.index("<svg") :])
+            for name, drawing in drawings.items()
+        ],
         failures=[(run.name, error) for run, error in study.failures.items()],
         sources=[
             (each.title or each.name, each.source) for each in experiment.entries if each.source
