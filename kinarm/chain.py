@@ -195,6 +195,8 @@ def within_limits(
 ) -> NDArray[np.float64]:
     """Clip configurations that rounding put beyond the limits, and refuse those farther out.
 
+    Raises InvalidInputError if one lies beyond a limit by more than `ROUNDING`.
+
     Parameters
     ----------
     name : str
@@ -203,11 +205,6 @@ def within_limits(
         Joint positions [rad or m].
     chain, joint_names
         The arm.
-
-    Raises
-    ------
-    InvalidInputError
-        If one lies beyond a limit by more than `ROUNDING`.
     """
     if not ((configurations < chain.lower) | (configurations > chain.upper)).any():
         return configurations

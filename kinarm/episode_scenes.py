@@ -28,6 +28,8 @@ def drawn_rows(
 ) -> Array:
     """Rows of all bodies in ``poses``, for each episode, shape (n, n_placed, 16).
 
+    Raises ProblemError if there is no place for a body.
+
     Parameters
     ----------
     scene, draws, chain
@@ -36,11 +38,6 @@ def drawn_rows(
         Starts [rad or m] and goals [m].
     threads : int
         Threads at most.
-
-    Raises
-    ------
-    ProblemError
-        If there is no place for a body.
     """
     n = len(starts)
     scenes, failed = np.empty((n, *draws.placed.shape)), np.empty(n, dtype=np.int64)

@@ -58,17 +58,14 @@ GRID = 1e-9
 def resolve_meshes(robot: ElementTree.Element, path: Path, folders: Collection[str]) -> None:
     """Replace mesh names in a URDF by paths.
 
+    Raises ArmError if a mesh that can touch something is missing.
+
     Parameters
     ----------
     robot, path
         Root and file of the URDF.
     folders : collection of str
         Folders of packages, beside those around the file.
-
-    Raises
-    ------
-    ArmError
-        If a mesh that can touch something is missing.
     """
     for use in ("collision", "visual"):
         for mesh in robot.findall(f"link/{use}/geometry/mesh"):
@@ -100,10 +97,7 @@ def _mesh_path(name: str, path: Path, folders: Collection[str]) -> Path | None:
 def mesh_content(path: Path) -> bytes:
     """Read a mesh file; its claims of how much it holds are checked.
 
-    Raises
-    ------
-    ArmError
-        If they are false, or the file is unreadable or of another format.
+    Raises ArmError if they are false, or the file is unreadable or of another format.
     """
     if path.suffix.lower() not in FORMATS:
         raise ArmError(f"mesh {path.name!r} must be a file of {', '.join(FORMATS)}")
@@ -144,8 +138,8 @@ def check_vertices(path: Path, vertices: NDArray[np.float64]) -> None:
 def hulls_of_mesh(path: Path, scale: NDArray[np.float64], count: int = 1) -> list[coal.ConvexBase]:
     """Convex hulls of a mesh file, or of the pieces that it is cut into.
 
-    A hull of many corners is replaced by a simpler polytope around it. Corners
-    are cached.
+    A hull of many corners is replaced by a simpler polytope around it. Corners are cached. Raises
+    ArmError if the file is no readable mesh.
 
     Parameters
     ----------
@@ -155,11 +149,6 @@ def hulls_of_mesh(path: Path, scale: NDArray[np.float64], count: int = 1) -> lis
         Factors along its axes.
     count : int
         Pieces at most.
-
-    Raises
-    ------
-    ArmError
-        If the file is no readable mesh.
     """
     content = bytes([count]) + scale.tobytes() + mesh_content(path)
     arrays = cached_arrays("hull", VERSION, content, lambda: _corners(path, scale, count))

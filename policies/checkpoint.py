@@ -111,6 +111,8 @@ def arrays_of(name: str, value: Any) -> dict[str, NDArray[Any]]:
 def rebuilt(kind: Any, name: str, arrays: Arrays) -> Any:
     """Rebuild what `arrays_of` flattened.
 
+    Raises InvalidInputError if an array has another type, or numbers that are not finite.
+
     Parameters
     ----------
     kind : type
@@ -119,11 +121,6 @@ def rebuilt(kind: Any, name: str, arrays: Arrays) -> Any:
         Name that its arrays have, or begin with.
     arrays : mapping of str to ndarray
         All arrays, of any shape.
-
-    Raises
-    ------
-    InvalidInputError
-        If an array has another type, or numbers that are not finite.
     """
     if is_dataclass(kind) or hasattr(kind, "_fields"):
         hints = get_type_hints(kind)

@@ -33,13 +33,8 @@ LINES = 8
 def write_all(study: "Study", command: str = "") -> Path:
     """Write the results of a study, and return the page.
 
-    The files are ``index.html``, ``RESULTS.md``, ``results.json``,
-    ``runs.csv``, ``curves.csv`` and the figures; ``command`` is recorded.
-
-    Raises
-    ------
-    OutputError
-        If a file cannot be written.
+    The files are ``index.html``, ``RESULTS.md``, ``results.json``, ``runs.csv``, ``curves.csv`` and
+    the figures; ``command`` is recorded. Raises OutputError if a file cannot be written.
     """
     folder = study.store.folder
     write_csv(folder / "runs.csv", study.rows())

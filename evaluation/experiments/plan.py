@@ -101,17 +101,14 @@ def plan(
 ) -> tuple[Run, ...]:
     """All trainings of an experiment, seed by seed: first results cover everything.
 
+    Raises KinarmError if a name is unknown, or a value is refused; names the field.
+
     Parameters
     ----------
     experiment : Experiment
         What is trained.
     choices : sequence of mappings, optional
         Values that vary, by field; those of the experiment by default.
-
-    Raises
-    ------
-    KinarmError
-        If a name is unknown, or a value is refused; names the field.
     """
     names = [entry.learner for entry in experiment.all_entries]
     learners = {each.name: each for each in map(find_learner, names)}
@@ -248,6 +245,8 @@ def _put(table: dict[str, Any], path: str, value: Any) -> None:
 def changed_problem(problem: ReachProblem, path: str, value: Any) -> ReachProblem:
     """A problem with another value of one field.
 
+    Raises KinarmError if there is no such field, or it cannot have the value.
+
     Parameters
     ----------
     problem : ReachProblem
@@ -256,11 +255,6 @@ def changed_problem(problem: ReachProblem, path: str, value: Any) -> ReachProble
         Path of the field, such as ``"task.start_spread"`` or ``"scene"``.
     value : object
         As for `ReachProblem.replace`, or as in a problem file.
-
-    Raises
-    ------
-    KinarmError
-        If there is no such field, or it cannot have the value.
     """
     if "." not in path:
         return problem.replace(**{path: value})

@@ -49,12 +49,8 @@ class Store:
     def writing(self, experiment: Experiment) -> Iterator["Store"]:
         """Claim the folder for an experiment and keep other writers out.
 
-        Raises
-        ------
-        InvalidInputError
-            If it is the folder of another experiment.
-        OutputError
-            If it cannot be written to, or another process writes to it.
+        Raises InvalidInputError if it is the folder of another experiment, and OutputError if it
+        cannot be written to, or another process writes to it.
         """
         check_folder(self.folder)
         marker = self.folder / SPECIFICATION

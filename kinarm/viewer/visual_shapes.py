@@ -157,13 +157,8 @@ def link_joints(arm: Arm) -> dict[str, int]:
 def visual_parts(arm: Arm) -> Iterator[ArmPart]:
     """Visual shapes of an arm's URDF, simplified where they are meshes.
 
-    A mesh of several colours keeps them; else the URDF's colour takes
-    precedence.
-
-    Raises
-    ------
-    KinarmError
-        If a shape is damaged or needs the missing extra ``robots``.
+    A mesh of several colours keeps them; else the URDF's colour takes precedence. Raises
+    KinarmError if a shape is damaged or needs the missing extra ``robots``.
     """
     robot = ElementTree.fromstring(arm.description.text)
     named: dict[str | None, int] = {}
@@ -217,16 +212,10 @@ def _numbers(element: Element, name: str, where: str = "a visual shape") -> tupl
 def read_mesh_file(path: Path, scale: Sequence[float]) -> tuple[PaintedMesh, ...]:
     """Read a mesh file and simplify it, or look it up in the cache.
 
-    Nodes are placed and units converted as the file says, without its up axis,
-    as in ROS and Pinocchio, so that looks and collision shapes agree. ``scale``
-    are factors along the axes.
-
-    Raises
-    ------
-    MissingExtraError
-        If the extra ``robots`` is not installed.
-    ArmError
-        If the file cannot be read.
+    Nodes are placed and units converted as the file says, without its up axis, as in ROS and
+    Pinocchio, so that looks and collision shapes agree. ``scale`` are factors along the axes.
+    Raises MissingExtraError if the extra ``robots`` is not installed, and ArmError if the file
+    cannot be read.
     """
     content = mesh_content(path)
     made_with = json.dumps([path.suffix, list(scale), TOLERANCE, _versions()])

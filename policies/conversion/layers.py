@@ -87,6 +87,8 @@ def policy_of_pieces(
 ) -> "Policy":
     """Make a policy of pieces from the observation to the action.
 
+    Raises InvalidInputError if they cannot be converted, or numbers of entries do not fit.
+
     Parameters
     ----------
     kind : type
@@ -97,11 +99,6 @@ def policy_of_pieces(
         Statistics that normalise observations before, if any.
     **origin
         Fields of `Provenance`, but for problem and versions.
-
-    Raises
-    ------
-    InvalidInputError
-        If they cannot be converted, or numbers of entries do not fit.
     """
     arm = problem.load_arm()
     n_observations, n_actions = ObservationLayout.of(problem, arm).size, arm.n_actuated
@@ -122,12 +119,8 @@ def policy_of_pieces(
 def module_pieces(module: Any) -> Iterator[Piece]:
     """Pieces of a module in order; parameters become float64, which is exact.
 
-    Raises
-    ------
-    InvalidInputError
-        If it is or holds a module that cannot be converted.
-    MissingExtraError
-        If PyTorch is not installed.
+    Raises InvalidInputError if it is or holds a module that cannot be converted, and
+    MissingExtraError if PyTorch is not installed.
     """
     try:
         from torch import nn
@@ -161,13 +154,8 @@ def module_pieces(module: Any) -> Iterator[Piece]:
 def normalization(statistics: Any, sizes: Mapping[str, int]) -> Iterator[Piece]:
     """The map by ``VecNormalize``: (x - mean) / sqrt(var + epsilon), and a clip.
 
-    It has statistics of some parts of the inputs, whose sizes are given in
-    order.
-
-    Raises
-    ------
-    InvalidInputError
-        If the statistics are of other observations.
+    It has statistics of some parts of the inputs, whose sizes are given in order. Raises
+    InvalidInputError if the statistics are of other observations.
     """
     if statistics is None or not statistics.norm_obs:
         return

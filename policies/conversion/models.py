@@ -136,10 +136,7 @@ def find_vec_normalize(model: Path) -> Path | None:
 def load_vec_normalize(given: Any) -> Any:
     """A ``VecNormalize``, or the file of one, which runs code: open only files that you trust.
 
-    Raises
-    ------
-    PolicyFileError
-        If a file cannot be read, or it is something else.
+    Raises PolicyFileError if a file cannot be read, or it is something else.
     """
     if isinstance(given, str | Path):
         with (
