@@ -30,12 +30,8 @@ Memory = Any
 class Actor:
     """Something that chooses actions for a batch of episodes.
 
-    Attributes
-    ----------
-    policy : callable or predictor
-        A function of observations, or what has a ``predict``.
-    statistics : VecNormalize or None
-        What normalises its observations.
+    Its policy is a function of observations, or has a ``predict``; statistics, a ``VecNormalize``,
+    normalise its observations.
     """
 
     policy: Any
@@ -124,12 +120,7 @@ def run_wrapped(
 class Recorder(Simulator):
     """Steps arms, and keeps the actions that arrive in the first episode of each.
 
-    Attributes
-    ----------
-    kept : ndarray, shape (n, horizon, n_actions)
-        The actions, filled in.
-    over : ndarray of bool, shape (n,)
-        Whether nothing is kept any more.
+    They are filled into ``kept``, shape (n, horizon, n_actions), until it is ``over``, shape (n,).
     """
 
     def keep_in(self, kept: Array) -> None:

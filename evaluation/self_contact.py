@@ -22,14 +22,9 @@ FIRST_PIECES = 4
 class SelfContact:
     """Which random configurations touch, with hulls and with meshes; see `random_configurations`.
 
-    Links are tested that are tested in simulations, but those of which shapes
-    touch at home. A mesh is a surface: nothing touches it from inside.
-
-    Attributes
-    ----------
-    simulated, meshes : ndarray of bool, shape (n,)
-        Whether each configuration touches with the arm's shapes, and with the
-        meshes of its URDF.
+    Links are tested that are tested in simulations, but those of which shapes touch at home. A mesh
+    is a surface: nothing touches it from inside. Verdicts, shape (n,), are with the arm's shapes,
+    ``simulated``, and with the ``meshes`` of its URDF.
     """
 
     def __init__(self, contact: ContactModel, count: int = SAMPLES) -> None:

@@ -101,14 +101,7 @@ def working(doing: str) -> Iterator[Callable[[str], object]]:
 class ProgressLine:
     """Shows progress and remaining time: a bar on a terminal, else lines now and then.
 
-    Parameters
-    ----------
-    title, unit : str
-        What is under way, and what is counted.
-    total : float
-        What there is to do.
-    console : rich.console.Console, optional
-        Where to show it; standard error by default.
+    It counts units up to a total, on standard error by default.
     """
 
     def __init__(

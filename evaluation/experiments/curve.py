@@ -154,15 +154,7 @@ class CurveSoFar:
 
 
 class Curve:
-    """The learning curve of a training under way, and its time.
-
-    Parameters
-    ----------
-    config, trials : TrainingConfig and TrialSettings
-        The training, and which trials its policies face.
-    so_far : CurveSoFar
-        The curve until now.
-    """
+    """The learning curve of a training under way, and its time."""
 
     def __init__(self, config: TrainingConfig, trials: TrialSettings, so_far: CurveSoFar) -> None:
         self._config, self._settings, clock = config, trials, so_far.clock

@@ -17,7 +17,7 @@ from kinarm.evaluation.experiments.plan import Run
 from kinarm.evaluation.experiments.table import Group, identity, shorter, shown
 from kinarm.evaluation.figures import COLOURS, panels_figure, save_figure
 from kinarm.evaluation.report.templating import markdown_table, template_environment
-from kinarm.evaluation.statistics import Estimate, share_over_seeds
+from kinarm.evaluation.statistics import share_over_seeds
 from kinarm.policies.provenance import package_versions, source_commit
 
 if TYPE_CHECKING:
@@ -223,17 +223,12 @@ def _draw_effect(axes: "Axes", study: "Study", field: str, runs: ByValue) -> Non
                 by_seed.setdefault(run.config.seed, []).append(hits)
             seeds = np.array([np.mean(each, axis=0) for each in by_seed.values()])
             mean = share_over_seeds(seeds)
-            value, bars = mean.value or 0.0, _whiskers(mean)
+            value = mean.value or 0.0
+            low, high = mean.ci95 or (value, value)
+            bars = [[max(value - low, 0.0)], [max(high - value, 0.0)]]
             axes.errorbar(place, value, yerr=bars, fmt="o", color=COLOURS[0], capsize=3)
     if not drawn and (not numeric or len(runs) <= 6):
         axes.set_xticks(places, [*runs], rotation=0 if numeric else 20)
         axes.minorticks_off()
     axes.margins(x=0.2)
     axes.set(title=shorter(field), ylim=(0, 1.02))
-
-
-def _whiskers(estimate: Estimate) -> list[list[float]]:
-    """Lengths of the interval below and above the value."""
-    value = estimate.value or 0.0
-    low, high = estimate.ci95 or (value, value)
-    return [[max(value - low, 0.0)], [max(high - value, 0.0)]]

@@ -110,16 +110,9 @@ class Start(NamedTuple):
 
 
 class Task(NamedTuple):
-    """A task of an executor.
+    """A training for an executor, from its start, None for the beginning.
 
-    Attributes
-    ----------
-    run : Run
-        The training.
-    start : Start or None
-        Where the training goes on; None for its beginning.
-    checkpoint : Path or None
-        Where it saves its state, if the folder exists.
+    It saves its state in the checkpoint, if there is one and its folder exists.
     """
 
     run: Run

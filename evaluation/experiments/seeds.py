@@ -63,12 +63,8 @@ def train_seeds(
 
     Parameters
     ----------
-    training : TrainRequest
-        What is trained; ``out`` is the folder of the policies.
-    seeds : tuple of int
-        The seeds.
-    jobs : int or None
-        Seeds at a time; one a processor by default.
+    training, seeds, jobs
+        As for `kinarm.evaluation.commands.train.SeedsRequest`.
     """
     config, folder = training.config(), Path(training.out)
     find_learner(config.learner).check_installed()

@@ -32,13 +32,7 @@ DISTANCE_COLOURS = 6
 
 
 def profiles(results: ProblemResults) -> tuple[list[float], list[list[Estimate]]]:
-    """Profiles of a problem.
-
-    Returns
-    -------
-    limits, shares : list of float, list of list of Estimate
-        Distances [m], ascending, and each group's share of trials within each.
-    """
+    """Ascending distances [m], and each group's share of trials within each."""
     furthest = max(float(group.distances.max()) for group in results.groups)
     low, high = results.tolerance / 5, max(furthest, 2 * results.tolerance)
     named = [limit for limit in (results.tolerance, *LIMITS) if low <= limit <= high]

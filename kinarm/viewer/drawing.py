@@ -59,14 +59,8 @@ FIELD_OF_VIEW, CAMERA_PLACE = 32, (-2.4, 1.6, 1.9)
 class DrawnScene:
     """The drawing commands that still count; any thread may add some.
 
-    A command replaces an earlier one for the same part of a node: the scene
-    grows with what is seen, not with time. The same drawing gives the same
-    bytes.
-
-    Attributes
-    ----------
-    window : meshcat.Visualizer
-        What to draw on.
+    A command replaces an earlier one for the same part of a node: the scene grows with what is
+    seen, not with time. The same drawing on its ``window`` gives the same bytes.
     """
 
     def __init__(self) -> None:

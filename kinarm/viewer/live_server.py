@@ -45,22 +45,8 @@ FILES = {
 class LiveServer(ThreadingTCPServer):
     """Serves a scene to browsers on this machine while it is drawn; for a ``with`` block.
 
-    A thread answers each visitor until the process ends.
-
-    Parameters
-    ----------
-    port : int
-        Port, or the next free one, which the attribute tells.
-
-    Attributes
-    ----------
-    window : meshcat.Visualizer
-        What to draw on.
-
-    Raises
-    ------
-    OutputError
-        If no port is free.
+    One draws on its ``window``. A thread answers each visitor until the process ends. The attribute
+    ``port`` tells which is used, the wanted or the next free one; an OutputError says if none is.
     """
 
     allow_reuse_address = daemon_threads = True

@@ -119,7 +119,13 @@ def lathe(profile: Sequence[tuple[float, float]], axis: str = "z") -> Mesh:
 
 
 def cylinder(length: float, radius: float, chamfer: float, axis: str = "z") -> Mesh:
-    """A cylinder about the origin with chamfered rims [m], along ``"x"``, ``"y"`` or ``"z"``."""
+    """A cylinder about the origin with chamfered rims [m].
+
+    Parameters
+    ----------
+    length, radius, chamfer, axis
+        Its sizes [m], and its direction: ``"x"``, ``"y"`` or ``"z"``.
+    """
     half = length / 2
     profile = [(-half, radius - chamfer), (-half + chamfer, radius)]
     return lathe([*profile, (half - chamfer, radius), (half, radius - chamfer)], axis)

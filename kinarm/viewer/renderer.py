@@ -182,12 +182,7 @@ class Renderer:
 class TriangleScene:
     """Surfaces of a problem and its arm, placed for each picture.
 
-    Attributes
-    ----------
-    n_joints, scale
-        Length of a configuration, and size of the stage (`stage_scale`).
-    finishes : list of Finish
-        Finishes by material; the floor's comes first.
+    Of its finishes by material, the floor's comes first; its scale is the `stage_scale`.
     """
 
     def __init__(self, problem: ReachProblem, arm: Arm) -> None:
@@ -225,13 +220,7 @@ class TriangleScene:
         outcome: str | None,
         time: float = 0.0,
     ) -> Surfaces:
-        """All triangles in the world.
-
-        Parameters
-        ----------
-        configuration, goal, trace, outcome, time
-            As for `kinarm.viewer.Renderer.render`.
-        """
+        """All triangles in the world; see `kinarm.viewer.Renderer.render`."""
         places, normals = np.empty_like(self._vertices), np.empty_like(self._normals)
         poses = self._poses(configuration, goal, time)
         transform(self._vertices, self._frames, poses, places)

@@ -22,11 +22,6 @@ class TrainingArms:
     meets those on the right. To stop at the goal, a success takes two steps in
     a row within the tolerance.
 
-    Parameters
-    ----------
-    config : PPOConfig
-        Settings of the training.
-
     Attributes
     ----------
     failed : FailedScenarios
@@ -54,13 +49,7 @@ class TrainingArms:
     def sample(
         self, rng: np.random.Generator, count: int, start_spread: float | None = None
     ) -> StartsAndGoals:
-        """Draw starts and goals without replay.
-
-        Parameters
-        ----------
-        rng, count, start_spread
-            As for `kinarm.Simulator.sample`.
-        """
+        """Draw starts and goals without replay; see `kinarm.Simulator.sample`."""
         drawn = self.simulator.sample(rng, count, start_spread=start_spread)
         return drawn if self.mirror is None else self.mirror.scenarios_from_the_right(*drawn)
 

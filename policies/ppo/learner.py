@@ -41,15 +41,8 @@ def seed_iteration(seed: int, iteration: int) -> tuple[np.random.Generator, np.r
 class PPOTraining:
     """A training under way; all that changes is in the `PPOState`.
 
-    Parameters
-    ----------
-    config : PPOConfig
-        The settings.
-    tensorboard : str or Path, optional
-        Folder of the logs.
-    threads : int, optional
-        Threads of an update; by default as many as processors. The result does
-        not depend on them.
+    Its logs go to the folder ``tensorboard``. Updates take as many threads as there are processors
+    by default; the result does not depend on them.
     """
 
     def __init__(

@@ -110,12 +110,7 @@ def orthogonal(normal: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 class ActorCritic:
-    """Actor and critic, whose parameters lie in one array.
-
-    Parameters
-    ----------
-    widths
-        As for `split_parameters`.
+    """Actor and critic, whose parameters lie in one array; for widths, see `split_parameters`.
 
     Attributes
     ----------
