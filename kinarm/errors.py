@@ -17,6 +17,7 @@ failures of a run.
 import copyreg
 import math
 from collections.abc import Iterable, Mapping
+from importlib import import_module
 from typing import Any
 
 import numpy as np
@@ -165,6 +166,14 @@ class MissingExtraError(KinarmError):
     def __init__(self, package: str, extra: str) -> None:
         self.package, self.extra = package, extra
         super().__init__(f"{package} is not installed: pip install 'kinarm[{extra}]'")
+
+
+def needed(module: str, package: str, extra: str) -> Any:
+    """Import a module of a package that an extra of kinarm brings, or raise `MissingExtraError`."""
+    try:
+        return import_module(module)
+    except ImportError as error:
+        raise MissingExtraError(package, extra) from error
 
 
 def finite_array(name: str, value: ArrayLike, shape: tuple[int | None, ...]) -> NDArray[np.float64]:

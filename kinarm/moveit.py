@@ -18,7 +18,7 @@ from kinarm.arm import Arm
 from kinarm.arm_specification import ArmSpecification
 from kinarm.bodies import Body, HeldBody
 from kinarm.chain import within_limits
-from kinarm.errors import InvalidInputError, KinarmError, MissingExtraError, finite_array
+from kinarm.errors import InvalidInputError, KinarmError, finite_array, needed
 from kinarm.problem import ReachProblem
 from kinarm.scene import GoalRegion, Mount, Scene
 from kinarm.task import ReachTask
@@ -36,10 +36,7 @@ class Entry:
     @classmethod
     def of_file(cls, file: Path, kind: str) -> "Entry":
         """All of a file of MoveIt, such as a ``"planning scene"``."""
-        try:
-            import yaml
-        except ImportError:
-            raise MissingExtraError("PyYAML", "robots") from None
+        yaml = needed("yaml", "PyYAML", "robots")
         with reading(repr(str(file)), kind, InvalidInputError, of="MoveIt"):
             return cls(yaml.safe_load(file.read_bytes()), file)
 

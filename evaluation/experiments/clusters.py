@@ -16,7 +16,7 @@ from typing import Any
 
 from kinarm import SEMANTICS
 from kinarm._interrupts import kept_from_children
-from kinarm.errors import InvalidInputError, MissingExtraError, WorkerError
+from kinarm.errors import InvalidInputError, WorkerError, needed
 from kinarm.evaluation.experiments.executors import Failure, attempt
 from kinarm.policies.oracle import ORACLE_SEMANTICS
 from kinarm.policies.provenance import package_versions
@@ -89,10 +89,7 @@ class RayExecutor:
         """Do the work for every task; see `Executor.map`."""
         if not tasks:
             return
-        try:
-            import ray
-        except ImportError as error:
-            raise MissingExtraError("ray", "ray") from error
+        ray = needed("ray", "ray", "ray")
         with kept_from_children():
             self._connect(ray)
         waiting, under_way = iter(tasks), dict[Any, Any]()
@@ -174,10 +171,7 @@ class SlurmExecutor:
         self, work: Callable[[Any], Any], tasks: Sequence[Any]
     ) -> Iterator[tuple[Any, Any | Failure]]:
         """Do the work for every task, bundle by bundle; see `Executor.map`."""
-        try:
-            import submitit
-        except ImportError as error:
-            raise MissingExtraError("submitit", "slurm") from error
+        submitit = needed("submitit", "submitit", "slurm")
         parts = [tasks[k : k + self.bundle] for k in range(0, len(tasks), self.bundle)]
         alike, jobs = partial(_do_alike, work, identity()), list[Any]()
         if not parts:

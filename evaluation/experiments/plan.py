@@ -221,7 +221,7 @@ def _config(entry: Entry, problem: ReachProblem, entries: Mapping[str, Any]) -> 
     for key, value in entries.items():
         if key.startswith(PROBLEM):
             try:
-                problem = changed_problem(problem, key.removeprefix(PROBLEM), value)
+                problem = _changed_problem(problem, key.removeprefix(PROBLEM), value)
             except KinarmError as error:
                 raise InvalidInputError(f"{key}: {error}") from error
         else:
@@ -242,19 +242,11 @@ def _put(table: dict[str, Any], path: str, value: Any) -> None:
     table[name] = value
 
 
-def changed_problem(problem: ReachProblem, path: str, value: Any) -> ReachProblem:
-    """A problem with another value of one field.
+def _changed_problem(problem: ReachProblem, path: str, value: Any) -> ReachProblem:
+    """A problem with another value of one field, as in a problem file.
 
-    Raises KinarmError if there is no such field, or it cannot have the value.
-
-    Parameters
-    ----------
-    problem : ReachProblem
-        The problem.
-    path : str
-        Path of the field, such as ``"task.start_spread"`` or ``"scene"``.
-    value : object
-        As for `ReachProblem.replace`, or as in a problem file.
+    Its path is such as ``"task.start_spread"`` or ``"scene"``. Raises KinarmError if there is no
+    such field, or it cannot have the value.
     """
     if "." not in path:
         return problem.replace(**{path: value})

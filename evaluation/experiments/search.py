@@ -11,7 +11,7 @@ import tomli_w
 
 from kinarm._fields import to_plain
 from kinarm._files import first_line, write_text
-from kinarm.errors import MissingExtraError
+from kinarm.errors import needed
 from kinarm.evaluation.experiments.curve import CurvePoint
 from kinarm.evaluation.experiments.executors import LocalExecutor
 from kinarm.evaluation.experiments.experiment import SEARCH_CHOICES, Experiment
@@ -28,22 +28,16 @@ JOURNAL, RECIPE = "search.journal", "best.toml"
 """Files of a search in the folder of its study."""
 
 
-def open_search(experiment: Experiment, folder: Path, draws: int = 0) -> "optuna.study.Study":
+def _open_search(experiment: Experiment, folder: Path, draws: int = 0) -> "optuna.study.Study":
     """Open or begin the search of an experiment in a folder.
 
-    Parameters
-    ----------
-    experiment, folder : Experiment and Path
-        The experiment and its folder.
-    draws : int
-        Tells the random numbers of this process from those of others.
+    ``draws`` tells the random numbers of this process from those of others.
     """
-    try:
-        import optuna
-        from optuna.storages import JournalStorage
-        from optuna.storages.journal import JournalFileBackend
-    except ImportError as error:
-        raise MissingExtraError("optuna", "tune") from error
+    needed("optuna", "optuna", "tune")
+    import optuna
+    from optuna.storages import JournalStorage
+    from optuna.storages.journal import JournalFileBackend
+
     optuna.logging.set_verbosity(optuna.logging.ERROR)
     said = experiment.search
     seed = int(np.random.SeedSequence([said.get("seed", 0), draws]).generate_state(1)[0])
@@ -76,7 +70,7 @@ def carry_out_search(experiment: Experiment, folder: Path, jobs: int, threads: i
     # A process that was killed may have left its lock.
     for left in folder.glob(f"{JOURNAL}.lock*"):
         left.unlink(missing_ok=True)
-    search = open_search(experiment, folder)
+    search = _open_search(experiment, folder)
     for trial in search.trials:
         if trial.state.name == "RUNNING":
             search.tell(trial.number, state=type(trial.state).FAIL)
@@ -106,7 +100,7 @@ def _try_settings(
     from optuna.trial import TrialState
 
     share, draws = task
-    search, store, failed = open_search(experiment, folder, draws), Store(folder), 0
+    search, store, failed = _open_search(experiment, folder, draws), Store(folder), 0
     while share > 0:
         trial = search.ask()
         try:
@@ -154,7 +148,7 @@ def _suggest(trial: Any, key: str, entry: Any) -> Any:
 
 def searched_runs(experiment: Experiment, folder: Path) -> tuple[Run, ...]:
     """The trainings of settings that were tried to the end, in order."""
-    trials = open_search(experiment, folder).trials if (folder / JOURNAL).exists() else []
+    trials = _open_search(experiment, folder).trials if (folder / JOURNAL).exists() else []
     complete = [trial for trial in trials if trial.state.name == "COMPLETE"]
     return plan(experiment, [_choices(experiment, trial) for trial in complete])
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from kinarm.errors import InvalidInputError, MissingExtraError
+from kinarm.errors import InvalidInputError, needed
 from kinarm.networks import Activation, Layer
 from kinarm.observation_layout import ObservationLayout
 from kinarm.policies.provenance import Provenance, package_versions
@@ -122,10 +122,7 @@ def module_pieces(module: Any) -> Iterator[Piece]:
     Raises InvalidInputError if it is or holds a module that cannot be converted, and
     MissingExtraError if PyTorch is not installed.
     """
-    try:
-        from torch import nn
-    except ImportError as error:
-        raise MissingExtraError("torch", "sb3") from error
+    nn = needed("torch", "torch", "sb3").nn
     functions: dict[type, Any] = {nn.Tanh: "tanh", nn.ReLU: "relu", nn.SiLU: "silu"}
     kind = type(module)
     if kind is nn.Sequential:

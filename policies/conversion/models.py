@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from kinarm._files import reading
-from kinarm.errors import InvalidInputError, MissingExtraError, PolicyFileError
+from kinarm.errors import InvalidInputError, MissingExtraError, PolicyFileError, needed
 from kinarm.observation_layout import ObservationLayout
 from kinarm.problem import ReachProblem
 
@@ -61,16 +61,13 @@ def sb3_model(given: Any) -> SB3Model:
 
 def saved_model(path: Path) -> SB3Model:
     """Build the networks of a file, without the buffers of a training."""
-    try:
-        from stable_baselines3.common.save_util import load_from_zip_file
-    except ImportError as error:
-        raise MissingExtraError("stable-baselines3", "sb3") from error
+    saving = needed("stable_baselines3.common.save_util", "stable-baselines3", "sb3")
     name = repr(str(path))
     told: Any = {"name": name, "kind": "model", "error": PolicyFileError, "of": "Stable-Baselines3"}
     try:
         with reading(**told), warnings.catch_warnings():
             warnings.simplefilter("ignore")  # about attributes that are not needed here
-            data, parameters, _ = load_from_zip_file(path, device="cpu")
+            data, parameters, _ = saving.load_from_zip_file(path, device="cpu")
     except PolicyFileError as error:
         if str(getattr(error.__cause__, "name", None)).startswith("sb3_contrib"):
             raise MissingExtraError("sb3-contrib", "zoo") from error

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from kinarm._console import doing
 from kinarm._parallel import available_threads
-from kinarm.errors import InvalidInputError, MissingExtraError, whole_number
+from kinarm.errors import InvalidInputError, needed, whole_number
 from kinarm.failed_scenarios import FailedScenarios
 from kinarm.policies.learners import CurvePoint
 from kinarm.policies.library import starting_policy, statistics
@@ -56,11 +56,8 @@ class PPOTraining:
         self.networks = ActorCritic(self._widths)
         self._writer: Any = None
         if tensorboard is not None:
-            try:
-                from tensorboard.summary import Writer
-            except ImportError as error:
-                raise MissingExtraError("tensorboard", "sb3") from error
-            self._writer = Writer(str(tensorboard))
+            summary = needed("tensorboard.summary", "tensorboard", "sb3")
+            self._writer = summary.Writer(str(tensorboard))
 
     def initial_state(self) -> PPOState:
         """State before the first iteration; the normaliser has seen random starts."""

@@ -7,7 +7,7 @@ import pytest
 
 from kinarm.errors import InvalidInputError, KinarmError
 from kinarm.evaluation.experiments.experiment import Experiment
-from kinarm.evaluation.experiments.plan import changed_problem, drawn_choices, plan
+from kinarm.evaluation.experiments.plan import _changed_problem, drawn_choices, plan
 from kinarm.policies.recipes import recipe
 from kinarm.problem import PROBLEMS, ReachProblem
 
@@ -235,19 +235,19 @@ class TestProblem:
         ],
     )
     def test_a_field(self, path, value, found):
-        assert found(changed_problem(PROBLEMS["right"], path, value)) == value
+        assert found(_changed_problem(PROBLEMS["right"], path, value)) == value
 
     def test_a_field_of_a_pinned_arm_makes_another_arm(self):
         """The hash of the arm that it was is not held against it."""
         pinned = PROBLEMS["right"].pinned
-        problem = changed_problem(pinned, "arm.tool_offset", [0.0, 0.0, 0.2])
+        problem = _changed_problem(pinned, "arm.tool_offset", [0.0, 0.0, 0.2])
         expected = PROBLEMS["right"].replace(
             arm=replace(PROBLEMS["right"].arm, tool_offset=(0.0, 0.0, 0.2))
         )
         assert problem.arm_digest == expected.arm_digest != pinned.arm_digest
 
     def test_a_scene_by_name(self):
-        problem = changed_problem(PROBLEMS["right"], "scene", "table")
+        problem = _changed_problem(PROBLEMS["right"], "scene", "table")
         assert problem.scene == ReachProblem.load("right").replace(scene="table").scene
 
     @pytest.mark.parametrize(
@@ -263,7 +263,7 @@ class TestProblem:
     )
     def test_unknown(self, path, words):
         with pytest.raises(KinarmError) as caught:
-            changed_problem(PROBLEMS["right"], path, 1)
+            _changed_problem(PROBLEMS["right"], path, 1)
         assert words in str(caught.value)
 
 

@@ -8,7 +8,7 @@ from small_studies import SMALL
 from kinarm.errors import InvalidInputError, MissingExtraError
 from kinarm.evaluation.experiments import search as searches
 from kinarm.evaluation.experiments.experiment import Experiment
-from kinarm.evaluation.experiments.search import open_search, recipe_entries
+from kinarm.evaluation.experiments.search import _open_search, recipe_entries
 from kinarm.evaluation.experiments.study import Study
 from kinarm.policies import recipe
 
@@ -30,7 +30,7 @@ SEARCH = {
 
 
 def states(study):
-    found = open_search(study.experiment, study.store.folder).trials
+    found = _open_search(study.experiment, study.store.folder).trials
     return [trial.state.name for trial in found]
 
 
@@ -74,7 +74,7 @@ class TestSearch:
     def test_what_was_under_way_is_tried_again(self, tmp_path):
         study = Study(SEARCH, tmp_path)
         with study.store.writing(study.experiment):
-            stuck = open_search(study.experiment, tmp_path).ask()
+            stuck = _open_search(study.experiment, tmp_path).ask()
             stuck.suggest_float("step_size", 0.01, 0.5, log=True)
         (tmp_path / "search.journal.lock").symlink_to("nowhere")
         study.run(jobs=1)
@@ -85,7 +85,7 @@ class TestSearch:
         impossible = {"count": 3, "top_directions": {"low": 3, "high": 6}}
         fixed = {"iterations": 3, "directions": 4}
         study = Study({**SEARCH, "fixed": fixed, "search": impossible}, tmp_path).run(jobs=1)
-        trials = open_search(study.experiment, tmp_path).trials
+        trials = _open_search(study.experiment, tmp_path).trials
         complete = [trial for trial in trials if trial.state.name == "COMPLETE"]
         assert len(complete) == 3
         assert {trial.params["top_directions"] for trial in complete} <= {3, 4}
@@ -133,4 +133,4 @@ def test_without_the_extra(tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, "optuna", None)
     specification = Experiment.from_json(SEARCH, "study")
     with pytest.raises(MissingExtraError, match=r"kinarm\[tune\]"):
-        searches.open_search(specification, tmp_path)
+        searches._open_search(specification, tmp_path)
