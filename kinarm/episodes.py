@@ -50,6 +50,8 @@ class Rules(NamedTuple):
         size.
     goal : GoalRules
         What is to be reached, and how; see ``kinarm.kernels.goals``.
+    shield : ndarray, shape (n, n_actuated), or of no rows
+        Shares of a step that may replace it; see ``kinarm.kernels.shield``.
     """
 
     step_limit: Array
@@ -64,6 +66,7 @@ class Rules(NamedTuple):
     width: int
     boxes: Array
     goal: Any
+    shield: Array
 
     @property
     def parts(self) -> int:
@@ -171,6 +174,12 @@ class Episodes(NamedTuple):
         Subtracted before summing, for accuracy.
     path : ndarray, shape (n, horizon + 1, n_joints) or (0, 0, n_joints)
         Configurations visited.
+    attempt, tried, blocker : ndarray, shape (n,)
+        Replacements tried of the step under way, distance of the last one from
+        it, and number, from 1, of the pair that it would have touched.
+    interventions, replaced : ndarray of int, shape (n,), and (n, horizon) or (0, horizon)
+        Steps that the shield replaced, and the pairs that these would have
+        touched, from 1; -1 if that is not known, and 0 for other steps.
     """
 
     status: NDArray[np.int64]
@@ -195,6 +204,11 @@ class Episodes(NamedTuple):
     moments: Array
     shift: Array
     path: Array
+    attempt: NDArray[np.int64]
+    tried: Array
+    blocker: NDArray[np.int64]
+    interventions: NDArray[np.int64]
+    replaced: NDArray[np.int64]
 
     @property
     def first_goals(self) -> Array:
@@ -312,6 +326,8 @@ class Rollouts:
         Final error of the goal's rest [rad, or rad or m], and goals reached.
     goal_paths : ndarray, shape (n, horizon + 1, goal_width), or empty
         Goals after each step, for those that move or follow each other.
+    interventions, replaced : ndarray of int, shape (n,), and (n, horizon), or empty
+        Steps that a shield replaced, and what they would have touched.
     """
 
     starts: Array
@@ -328,6 +344,8 @@ class Rollouts:
     turn: Array
     goals_reached: NDArray[np.int64]
     goal_paths: Array
+    interventions: NDArray[np.int64]
+    replaced: NDArray[np.int64]
 
     @classmethod
     def from_episodes(cls, starts: Array, episodes: Episodes, *, copy: bool = False) -> "Rollouts":
@@ -357,6 +375,8 @@ class Rollouts:
             turn=kept(episodes.turn),
             goals_reached=kept(episodes.pursuit.goals_reached),
             goal_paths=kept(episodes.pursuit.path),
+            interventions=kept(episodes.interventions),
+            replaced=kept(episodes.replaced),
         )
         for array in vars(rollouts).values():
             array.flags.writeable = False

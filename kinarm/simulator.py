@@ -119,6 +119,12 @@ class Simulator:
         other.world = self.world.with_plant(plant)
         return other
 
+    def shielded(self, shield: bool = True) -> "Simulator":
+        """The same simulator with or without a shield."""
+        other = copy(self)
+        other.world = self.world.shielded(shield)
+        return other
+
     def without_moving_bodies(self) -> "Simulator":
         """The same simulator without the bodies that move."""
         other = copy(self)
@@ -365,6 +371,12 @@ class Simulator:
         episodes = session.episodes
         refused, asked = self.world.decided(episodes, paused)
         self.checked_by_coal += asked
+        if len(self.world.rules.shield):
+            rows = paused[refused]
+            episodes.blocker[rows], episodes.touched[rows] = -1, 0
+            episodes.attempt[rows], episodes.tried[rows] = 1, 0.0
+            episodes.status[paused], episodes.cleared[paused] = RUNNING, ~refused
+            return paused
         resumed: NDArray[np.int64] = paused[~refused]
         episodes.status[resumed] = RUNNING
         episodes.cleared[paused] = ~refused

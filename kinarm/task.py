@@ -156,7 +156,11 @@ class Stepping(Checked):
     tested_configurations : int
         Evenly spaced configurations, from 1 to 32, at which the motion of a
         step is tested for contact, its end included; 0 for all of the motion.
+    shield : bool
+        Replace a step that would touch something by the nearest one that does
+        not, instead of ending the episode.
     """
 
     time_step: float = field(default=0.02, metadata=POSITIVE)
     tested_configurations: int = field(default=0, metadata={**FROM_ZERO, "at_most": 32})
+    shield: bool = field(default=False, metadata=OPTIONAL)

@@ -35,6 +35,7 @@ from kinarm.observation_layout import ObservationLayout
 from kinarm.plant import PlantLike
 from kinarm.problem import ProblemLike, ReachProblem
 from kinarm.scene_draws import SceneDraws
+from kinarm.shield import shield_table
 from kinarm.step_contact import StepContact
 
 NO_PURSUIT = recorded(
@@ -102,6 +103,7 @@ class World(GoalKinematics, StepContact):
             width=self.layout.width,
             boxes=unit_boxes(self.problem.scene.bodies),
             goal=recorded(self.goal_rules()),
+            shield=shield_table(self.arm.n_actuated if stepping.shield else 0),
         )
         self.plants = EpisodePlants(self.problem, self.rules.step_limit)
         self.has_random_bodies = bool(self.problem.scene.random_bodies)
@@ -115,6 +117,13 @@ class World(GoalKinematics, StepContact):
         other = copy(self)
         other.problem = self.problem.replace(tolerance=tolerance)
         other.rules = self.rules._replace(tolerance=float(tolerance))
+        return other
+
+    def shielded(self, shield: bool = True) -> "World":
+        """The same world with or without a shield."""
+        other = copy(self)
+        other.problem = self.problem.replace(shield=shield)
+        other.rules = self.rules._replace(shield=shield_table(self.n_actions if shield else 0))
         return other
 
     def with_plant(self, plant: PlantLike) -> "World":
@@ -332,6 +341,11 @@ class World(GoalKinematics, StepContact):
             total=np.zeros(n),
             moments=np.zeros((0 if shift is None else n, 2, n_observations)),
             shift=np.zeros(n_observations) if shift is None else shift.copy(),
+            attempt=np.zeros(n, dtype=np.int64),
+            tried=np.zeros(n),
+            blocker=np.zeros(n, dtype=np.int64),
+            interventions=np.zeros(n, dtype=np.int64),
+            replaced=np.zeros((n if record else 0, horizon), dtype=np.int64),
             path=np.full((n, horizon + 1, n_joints) if record else (0, 0, n_joints), np.nan),
         )
 

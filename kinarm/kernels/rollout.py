@@ -4,6 +4,8 @@ Numbers of an episode depend on its inputs alone. A step that is not proven free
 until Coal has decided.
 """
 
+import math
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -35,6 +37,7 @@ from kinarm.kernels.session import (
     take_number,
     take_rows,
 )
+from kinarm.kernels.shield import fails_again, replace_step, take_down
 
 
 @lean_kernel
@@ -89,6 +92,7 @@ def begin(counters: NDArray[np.int64], session: Session, rows: NDArray[np.int64]
             episodes.status[e] = RUNNING if free >> lane & 1 else PAUSED
             n_paused += 0 if free >> lane & 1 else 1
             episodes.total[e] = 0.0
+            episodes.attempt[e] = episodes.interventions[e] = 0
             episodes.cleared[e] = False
             episodes.distance[e] = distances[0, lane]
             for term in range(episodes.terms.shape[1]):
@@ -120,17 +124,23 @@ def advance(counters: NDArray[np.int64], session: Session) -> int:
     control, episodes = session.control, session.episodes
     block, alone = session.block, session.alone
     lower, upper, row = chain.lower, chain.upper, block.row
+    again, shielded = block.again, rules.shield.shape[0] > 0
     n_joints, n_actuated = episodes.q.shape[1], rules.step_limit.shape[0]
     n_episodes, n_pairs = episodes.status.shape[0], shapes.planes.shape[0]
     shared, summed = shared_policy(n_episodes, control), block.moments.shape[1]
     before, poses = block.before, block.after
     for lane in range(LANES):
-        row[lane] = -1
+        row[lane] = again[lane] = -1
     waiting, n_alive, n_paused, changed = 0, 0, 0, True
     while True:
         # Fill the lanes that are empty.
         for lane in range(row.shape[0]):
-            if row[lane] < 0 and waiting < n_episodes:
+            if row[lane] < 0 and again[lane] >= 0:
+                row[lane], again[lane] = again[lane], -1
+                load_episode(row[lane], lane, shapes, rules, control, episodes, block)
+                n_alive += 1
+                changed = True
+            elif row[lane] < 0 and waiting < n_episodes:
                 waiting = next_waiting(counters, episodes)
                 if waiting < n_episodes:
                     row[lane] = waiting
@@ -141,9 +151,15 @@ def advance(counters: NDArray[np.int64], session: Session) -> int:
             return n_paused
         # Act, unless Coal has found the step under way free.
         choose_actions(control, shared, row, block)
+        if shielded:
+            for lane in range(row.shape[0]):
+                if row[lane] >= 0 and episodes.attempt[row[lane]] > 0:
+                    given = rules, episodes, block, alone
+                    replace_step(lane, row[lane], chain, shapes, *given)
         fresh = (block.alive[0] > 0.0) & ~(block.cleared[0] > 0.0)
+        wanted = fresh & ~(block.attempt[0] > 0.0)
         for i in range(summed):
-            centred = select(fresh, block.observation[0, i] - episodes.shift[i], 0.0)
+            centred = select(wanted, block.observation[0, i] - episodes.shift[i], 0.0)
             block.moments[0, i] += centred
             block.moments[1, i] += centred * centred
         if block.plant.shape[0] > 0:
@@ -152,7 +168,7 @@ def advance(counters: NDArray[np.int64], session: Session) -> int:
             for axis in range(n_actuated):
                 moved = block.q[0, axis] + block.action[0, axis] * rules.step_limit[axis]
                 moved = min(max(moved, lower[axis]), upper[axis])
-                block.target[0, axis] = select(fresh, moved, block.target[0, axis])
+                block.target[0, axis] = select(wanted, moved, block.target[0, axis])
         # Prove the steps free: together, then by new planes, then one by one.
         before, poses = poses, before
         forward_kinematics(chain, block.target, 0, poses)
@@ -186,7 +202,11 @@ def advance(counters: NDArray[np.int64], session: Session) -> int:
                     episodes.doubt[e] = doubt
                     pair = first_contact(lane, doubt, chain, shapes, rules.tested, block, alone)
                     episodes.touched[e] = pair if rules.tested > 0 else 0
-                    if pair > 0:
+                    stuck = episodes.attempt[e] > 0 and episodes.tried[e] == math.inf
+                    if shielded and not stuck and (pair > 0 or episodes.attempt[e] > 0):
+                        fails_again(e, pair, episodes)
+                        again[lane] = e
+                    elif pair > 0:
                         refuse_step(e, rules, episodes)
                     else:
                         episodes.status[e] = PAUSED
@@ -198,6 +218,10 @@ def advance(counters: NDArray[np.int64], session: Session) -> int:
         block.cleared[0] = 0.0
         nearer = block.distance[0]
         block.steps[0] += 1.0
+        if shielded:
+            for lane in range(row.shape[0]):
+                if row[lane] >= 0 and episodes.attempt[row[lane]] > 0:
+                    take_down(lane, row[lane], episodes, block)
         remember(block)
         for joint in range(n_joints):
             block.q[0, joint] = block.target[0, joint]

@@ -99,7 +99,9 @@ def layouts(
         "weights": (ONE, own),
         # Distance to the goal [m], return, steps taken, and step to hand back; 1 for an episode
         # that is there, and for a step under way that Coal found free, else 0.
-        **dict.fromkeys(("distance", "total", "steps", "stop", "alive", "cleared"), (ONE,)),
+        **dict.fromkeys(
+            ("distance", "total", "steps", "stop", "alive", "cleared", "attempt"), (ONE,)
+        ),
         # Weighted terms of the last reward.
         "terms": (ONE, n_terms),
         # Sums of the observations acted upon, less the shift, and their squares.
@@ -110,6 +112,8 @@ def layouts(
         "q": (ONE, n_joints),
         **dict.fromkeys(("before", "after"), (n_joints + 1 + n_placed, Fixed(POSE))),
         "plane": (ONE, Fixed(PLANE)),
+        # How a height changes with each joint.
+        "slopes": (ONE, n_actuated),
         # Where bodies of the scene that move are before and after the step [m].
         "moved": (n_placed, Fixed(6)),
         # See `kinarm.kernels.planes.separate`.
@@ -118,8 +122,9 @@ def layouts(
     }
     in_lanes: Shapes = {name: (lanes, shape) for name, shape in block.items()}
     numbers: Shapes = {name: (types.float64, shape) for name, shape in alone.items()}
-    # Episode in each lane, -1 for none; open pairs, and configurations of each.
-    in_lanes["row"] = (types.int64, (Fixed(LANES),))
+    # Episode in each lane, and one to be put there again, -1 for none; open pairs, and
+    # configurations of each.
+    in_lanes["row"] = in_lanes["again"] = (types.int64, (Fixed(LANES),))
     numbers["listed"] = (types.int64, (n_pairs + 1, Fixed(2)))
     return Layout("Block", in_lanes), Layout("Alone", numbers)
 
@@ -251,6 +256,7 @@ def load_episode(
     as_numbers(block.steps)[0, lane] = episodes.steps[e]
     as_numbers(block.stop)[0, lane] = episodes.stop[e]
     as_numbers(block.cleared)[0, lane] = 1.0 if episodes.cleared[e] else 0.0
+    as_numbers(block.attempt)[0, lane] = episodes.attempt[e]
     as_numbers(block.alive)[0, lane] = 1.0
 
 
