@@ -20,12 +20,16 @@ from kinarm.evaluation.trials import TrialSet, trial_generator
 from kinarm.networks import Layer, Networks, PolicyFunction
 from kinarm.observation_layout import ObservationLayout, observation_layout
 from kinarm.plant import Plant
+from kinarm.policies.library import group_of
 from kinarm.policies.policy import Policy
 from kinarm.policies.provenance import normalization_remark
 from kinarm.problem import PROBLEMS, ReachProblem
 
 NEVER = sys.float_info.min
 """A tolerance that nothing meets [m]."""
+
+SHIELDED = "+shield"
+"""What the name of a shielded contestant has more."""
 
 AIM = 0.005
 """How close the oracle aims where success does not end trials [m]."""
@@ -60,6 +64,8 @@ class Contestant:
         What chooses its actions in Python, to run in a wrapper.
     remarks : tuple of str
         What its figures assume: a wrapper, statistics of observations.
+    has_shield : bool
+        Whether steps that would touch are replaced.
     """
 
     name: str
@@ -72,6 +78,17 @@ class Contestant:
     best_for: tuple[ReachProblem, ...] = ()
     actor: Actor | None = None
     remarks: tuple[str, ...] = ()
+    has_shield: bool = False
+
+    def shielded(self) -> "Contestant":
+        """The same behind a shield (``kinarm.shield``), under a name of its own."""
+        group = group_of(self.name)
+        return replace(
+            self,
+            name=f"{group}{SHIELDED}{self.name.removeprefix(group)}",
+            run=partial(_run_shielded, self.run),
+            has_shield=True,
+        )
 
     @property
     def note(self) -> str:
@@ -218,6 +235,12 @@ def _run_random(trials: TrialSet, *, record: bool = False) -> Rollouts:
     generators = [trial_generator(trials.seed, trial, stream=1) for trial in range(len(trials))]
     actions = np.array([generator.uniform(-1, 1, shape) for generator in generators])
     return simulator.rollout_actions(actions, trials.starts, trials.goals, record=record)
+
+
+def _run_shielded(
+    run: Callable[..., Rollouts], trials: TrialSet, *, record: bool = False
+) -> Rollouts:
+    return run(replace(trials, simulator=trials.simulator.shielded()), record=record)
 
 
 def _run_oracle(trials: TrialSet, *, record: bool = False) -> Rollouts:

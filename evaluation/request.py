@@ -67,6 +67,9 @@ class EvaluationRequest(ProblemOptions, TableOptions):
         face the trials.
     allow_other_arm : bool
         Allow an arm that a policy was not trained for.
+    shield : bool
+        Evaluate each policy also behind a shield, which replaces steps that would
+        touch something.
     matrix : bool
         Every policy on every problem, not only on its own.
     oracle : bool
@@ -115,6 +118,7 @@ class EvaluationRequest(ProblemOptions, TableOptions):
     wrapper: str | None = field(default=None, metadata={"metavar": "MODULE:FUNCTION"})
     allow_other_arm: bool = False
     matrix: bool = False
+    shield: bool = False
     oracle: bool = True
     hold: bool = False
     out: Path | None = field(default=None, metadata={"metavar": "FOLDER"})
@@ -125,7 +129,7 @@ class EvaluationRequest(ProblemOptions, TableOptions):
 
     GROUPS: ClassVar = {
         "what is evaluated": (
-            "policies against problems vec_normalize wrapper matrix allow_other_arm"
+            "policies against problems vec_normalize wrapper shield matrix allow_other_arm"
         ),
         "trials": "trials seed oracle hold",
         "table": "columns csv markdown json",

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from kinarm.errors import InvalidInputError, UnknownNameError
-from kinarm.evaluation.contestants import BASELINES, ORACLE, Contestant
+from kinarm.evaluation.contestants import BASELINES, ORACLE, UNTRAINED, Contestant
 from kinarm.evaluation.finding import check_normalizing, find_contestants
 from kinarm.policies.library import BEST, group_of, is_shipped, policy_names
 from kinarm.problem import PROBLEMS, ReachProblem
@@ -30,6 +30,8 @@ def select_pairs(request: "EvaluationRequest") -> list[Pair]:
     named = _named_problems(request)
     chosen = _named_contestants(request, named) if request.policies else _shipped(request, named)
     check_normalizing(chosen, request.vec_normalize)
+    if request.shield:
+        chosen += [each.shielded() for each in chosen if each not in UNTRAINED.values()]
     changed = partial(_changed, request)
     pairs = []
     for problem, contestant in product(named or _problems(request, chosen), chosen):
@@ -187,7 +189,7 @@ def _training(contestant: Contestant) -> Hashable:
     made = contestant.policy.provenance
     settings = {name: value for name, value in made.config.items() if name not in VARYING}
     shared = json.dumps(settings, sort_keys=True)
-    return made.algorithm, made.recipe, shared, made.problem.digest
+    return made.algorithm, made.recipe, shared, made.problem.digest, contestant.has_shield
 
 
 def _is_shipped(contestant: Contestant) -> bool:

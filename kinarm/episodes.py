@@ -177,6 +177,9 @@ class Episodes(NamedTuple):
     attempt, tried, blocker : ndarray, shape (n,)
         Replacements tried of the step under way, distance of the last one from
         it, and number, from 1, of the pair that it would have touched.
+    projected : ndarray, shape (n, n_actuated + 2)
+        Its projection off what it touches, how far that is, and how often it was
+        projected.
     interventions, replaced : ndarray of int, shape (n,), and (n, horizon) or (0, horizon)
         Steps that the shield replaced, and the pairs that these would have
         touched, from 1; -1 if that is not known, and 0 for other steps.
@@ -207,6 +210,7 @@ class Episodes(NamedTuple):
     attempt: NDArray[np.int64]
     tried: Array
     blocker: NDArray[np.int64]
+    projected: Array
     interventions: NDArray[np.int64]
     replaced: NDArray[np.int64]
 

@@ -15,6 +15,7 @@ from kinarm.errors import InvalidInputError, StartInContactError, finite_array
 from kinarm.kernels.compiling import Array
 from kinarm.kernels.rollout import advance, allow_one_step, begin, refuse, results_of_step
 from kinarm.kernels.session import Session
+from kinarm.kernels.shield import TRIED
 from kinarm.networks import CompiledPolicy, Networks, PolicyFunction, network_control, takes_rows
 from kinarm.plant import PlantLike
 from kinarm.problem import ProblemLike, ReachProblem
@@ -375,6 +376,7 @@ class Simulator:
             rows = paused[refused]
             episodes.blocker[rows], episodes.touched[rows] = -1, 0
             episodes.attempt[rows], episodes.tried[rows] = 1, 0.0
+            episodes.projected[rows, -2:] = TRIED, 0.0
             episodes.status[paused], episodes.cleared[paused] = RUNNING, ~refused
             return paused
         resumed: NDArray[np.int64] = paused[~refused]

@@ -344,6 +344,7 @@ class World(GoalKinematics, StepContact):
             attempt=np.zeros(n, dtype=np.int64),
             tried=np.zeros(n),
             blocker=np.zeros(n, dtype=np.int64),
+            projected=np.zeros((n, self.n_actions + 2)),
             interventions=np.zeros(n, dtype=np.int64),
             replaced=np.zeros((n if record else 0, horizon), dtype=np.int64),
             path=np.full((n, horizon + 1, n_joints) if record else (0, 0, n_joints), np.nan),

@@ -114,6 +114,8 @@ def layouts(
         "plane": (ONE, Fixed(PLANE)),
         # How a height changes with each joint.
         "slopes": (ONE, n_actuated),
+        # The step that was wanted.
+        "step": (ONE, n_actuated),
         # Where bodies of the scene that move are before and after the step [m].
         "moved": (n_placed, Fixed(6)),
         # See `kinarm.kernels.planes.separate`.
