@@ -37,6 +37,8 @@ class ProblemOptions(Checked):
         What lies between commands and joints, by name or file.
     feedback : {"measured", "commanded"}
         Which joint positions are seen.
+    shield : bool
+        Replace steps that would touch something.
     tolerance : float
         Distance at which a goal counts as reached [m].
     horizon : int
@@ -55,12 +57,14 @@ class ProblemOptions(Checked):
     scene: str | None = field(default=None, metadata={"names": scene_names})
     plant: str | None = field(default=None, metadata={"names": plant_names})
     feedback: Literal["measured", "commanded"] | None = None
+    shield: bool = False
     tolerance: float | None = None
     horizon: int | None = None
     start_spread: float | None = None
 
     CHANGES: ClassVar = (
-        "arm tool_frame package_dirs task scene plant feedback tolerance horizon start_spread"
+        "arm tool_frame package_dirs task scene plant feedback shield tolerance horizon "
+        "start_spread"
     )
     """Fields that change a problem."""
 
@@ -85,6 +89,7 @@ class ProblemOptions(Checked):
         problem = ReachProblem.load(named or default)
         for name in ("arm", "tool_frame", "package_dirs"):
             del changed[name]
+        changed["shield"] = self.shield or None
         return problem.replace(arm=self._arm(problem), **changed)
 
     def _arm(self, problem: ReachProblem) -> "Arm | None":

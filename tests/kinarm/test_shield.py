@@ -7,6 +7,7 @@ import pytest
 from reference_episodes import held_actions
 
 from kinarm.bodies import RandomBodies
+from kinarm.errors import KinarmError
 from kinarm.problem import ReachProblem
 from kinarm.shield import shield_table
 from kinarm.simulator import Simulator
@@ -114,4 +115,6 @@ def test_shields_of_many_joints_are_small():
 def test_a_problem_may_have_a_shield():
     problem = ReachProblem.load("right").replace(shield=True)
     assert problem.changes == ["stepping.shield = True"]
+    with pytest.raises(KinarmError, match="needs an ideal plant"):
+        problem.replace(plant="hard")
     assert not rollouts_of(Simulator(problem), 100).collision.any()
