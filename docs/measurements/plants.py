@@ -97,13 +97,13 @@ class ServoArm:
             way[:] = state.qpos
             state.ctrl[:] = commands[row]
             for part in range(parts if running[row] else 0):
-                for _ in range(round(time_step / SUBSTEP / parts)):
-                    mujoco.mj_step(self.model, state)
-                    speeds = np.clip(state.qvel, -fastest, fastest)
-                    within = np.clip(state.qpos + SUBSTEP * (speeds - state.qvel), *limits)
-                    state.qvel[:] = speeds
-                    state.qvel[(within == limits[0]) | (within == limits[1])] = 0.0
-                    state.qpos[:] = within
+                mujoco.mj_step(self.model, state, round(time_step / SUBSTEP / parts))
+                speeds = np.clip(state.qvel, -fastest, fastest)
+                late = 0.5 * time_step / parts * (speeds - state.qvel)
+                within = np.clip(state.qpos + late, *limits)
+                state.qvel[:] = speeds
+                state.qvel[(within == limits[0]) | (within == limits[1])] = 0.0
+                state.qpos[:] = within
                 way[part] = state.qpos
         return ways
 
