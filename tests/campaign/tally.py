@@ -28,23 +28,16 @@ class Tally:
         How often each claim was checked, and how often it did not hold.
     examples : list of dict
         Some failures, with what it takes to repeat them.
-    measures : dict of float
-        Largest values seen, by their name.
     """
 
     counts: dict[str, int] = field(default_factory=dict)
     checked: dict[str, int] = field(default_factory=dict)
     failed: dict[str, int] = field(default_factory=dict)
     examples: list[dict[str, Any]] = field(default_factory=list)
-    measures: dict[str, float] = field(default_factory=dict)
 
     def count(self, what: str, number: int = 1) -> None:
         """Add to a size."""
         self.counts[what] = self.counts.get(what, 0) + int(number)
-
-    def largest(self, what: str, value: float) -> None:
-        """Keep the largest value."""
-        self.measures[what] = max(self.measures.get(what, 0.0), float(value))
 
     def find(self, what: str, **example: Any) -> None:
         """Note something that is wrong."""
