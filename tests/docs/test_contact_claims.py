@@ -15,6 +15,7 @@ from kinarm.reference import ReferenceSimulator
 def test_it_goes_on_where_it_ended(tmp_path, monkeypatch):
     parts = {part: (check, 3, most) for part, (check, _, most) in contact_claims.PARTS.items()}
     monkeypatch.setattr(contact_claims, "PARTS", parts)
+    monkeypatch.setattr(contact_claims, "SAMPLES", 300)
     for configurations, steps in ((3, 2), (9, 4)):
         counts = ["--configurations", str(configurations), "--steps", str(steps), "--episodes", "2"]
         contact_claims.main([*counts, "--arms", "paper", "--folder", str(tmp_path)])
@@ -29,6 +30,7 @@ def test_it_goes_on_where_it_ended(tmp_path, monkeypatch):
 @pytest.mark.parametrize("part", ["configurations", "episodes", "steps"])
 def test_it_finds_what_is_wrong(part, monkeypatch):
     """A Coal that sees nothing, or steps that are tested at four configurations alone."""
+    monkeypatch.setattr(contact_claims, "SAMPLES", 300)
     few = changed(contact_claims.before_plate("paper"), tested_configurations=4)
     assert contact_claims.check((part, "paper", 0, 100))[2] == []
     monkeypatch.setattr(ContactModel, "in_contact", lambda _, q: np.zeros(len(q), bool))

@@ -65,11 +65,8 @@ def test_orientation_by_angles_and_by_quaternion():
         ),
         ({"size": (1, 1)}, r"box 'it': size must be x, y, z \[m\], got \[1.0, 1.0\]"),
         ({"size": (1, 0, 1)}, "box 'it': y must be 1e-06 to 10000 m, got 0"),
-        ({"shape": "sphere", "size": (2e4,)}, "sphere 'it': radius must be 1e-06 to 10000 m"),
-        ({"shape": "halfspace", "size": (1,)}, "halfspace 'it': size must be empty"),
         ({"quaternion": (0, 0, 0, 0)}, "quaternion must have a length of about 1"),
         ({"quaternion": (1, 0, 0, 0), "rpy": (0, 0, 1)}, "has both rpy and quaternion"),
-        ({"vertices": CORNERS}, "vertices are for shape 'mesh'"),
         ({"shape": "mesh", "size": (), "vertices": CORNERS[:3]}, "4 to 1000 vertices are possible"),
         ({"shape": "mesh", "size": (), "vertices": CORNERS[:4]}, "hull of the vertices has no vol"),
     ],
@@ -145,12 +142,12 @@ def test_episodes_are_those_of_the_reference(shape):
     count = 1 if shape == "halfspace" else 5
     scene = random_scene(7, count, (shape,), ground=shape != "halfspace")
     simulator = Simulator(ReachProblem.load("both").replace(scene=scene), threads=1)
-    _, collisions, count = compare_actions(simulator, 8, 60)
+    _, collisions, count = compare_actions(simulator, 8, 40)
     assert 0.1 * count < collisions < count
 
 
 def test_claims_hold_in_many_scenes():
-    for seed in range(20):
+    for seed in range(8):
         problem = ReachProblem.load("both").replace(scene=random_scene(seed, 10))
         world = World(problem, threads=1)
         arm = world.arm

@@ -4,14 +4,11 @@ import gymnasium
 import numpy as np
 import pytest
 from configurations import pair_distances, random_configurations
-from hanging_chain import RADIUS, tips
 from reference_episodes import compare_actions
 from simulators import changed
-from step_proofs import proofs
 
 from kinarm.arm import Arm
 from kinarm.bodies import Body
-from kinarm.kernels.proof import MARGIN
 from kinarm.motion_contact import _distances
 from kinarm.problem import PROBLEMS
 from kinarm.scene import Scene
@@ -34,8 +31,8 @@ def pen(make_joint, make_collision, write_robot):
 
 
 def test_a_pen_never_passes_a_thin_plate(pen):
-    starts = np.linspace(-0.9, 0.15, 400)[:, None]
-    goals, actions = np.tile([0.0, 0.6, 0.6], (400, 1)), np.ones((400, 64, 1))
+    starts = np.linspace(-0.9, 0.15, 100)[:, None]
+    goals, actions = np.tile([0.0, 0.6, 0.6], (100, 1)), np.ones((100, 64, 1))
     discrete, whole = (each.rollout_actions(actions, starts, goals) for each in pen)
     assert discrete.collision.mean() == pytest.approx(0.25, abs=0.05)  # as the docs say
     assert whole.collision.all()
@@ -75,27 +72,6 @@ def test_it_refuses_all_that_the_discrete_rule_refuses(simulators, name):
         distances = pair_distances(whole.world, contact.configuration[None])
         assert -1e-5 < distances.min() < 2e-6
         assert contact.pair == whole.world.contact_model.pair_names[int(distances.argmin())]
-
-
-def test_a_dip_between_free_configurations_is_in_doubt(hanging):
-    """The chain dips as deep as its bend allows, to just above the margin or just below."""
-    simulator, rng = hanging(), np.random.default_rng(1)
-    moves = rng.uniform(0.05, 0.1, (400, 3)) * rng.choice([-1, 1], (400, 1))
-    lowest = np.where(np.arange(400) % 2, 0.5, rng.uniform(0.3, 0.7, 400))
-    shares = np.linspace(0, 1, 2001)
-    way = np.zeros((2001, 400, 4))
-    way[..., 1:] = (shares[:, None] - lowest)[..., None] * moves
-    height = np.where(np.arange(400) % 3, 1e-4, 0.0) + MARGIN
-    height = np.where(np.arange(400) % 5, height, MARGIN - 1e-6)
-    way[..., 0] = RADIUS - tips(way)[..., 1].min(axis=0) + height
-    assert (tips(way)[0, :, 1] - RADIUS > MARGIN).all()
-    bounds, doubt, _ = proofs(simulator, 0, way[0], way[-1])
-    assert (bounds <= height + 1e-9).all()
-    assert (doubt[height < MARGIN] != 0).all()
-    assert (doubt[height > 5e-5] == 0).all()
-    part = np.floor(lowest * 16).astype(int)
-    below = height < MARGIN
-    assert (doubt[below] >> part[below] & 1).all()
 
 
 def test_environments_name_what_was_touched_first(pen):

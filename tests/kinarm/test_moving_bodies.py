@@ -104,14 +104,10 @@ def test_motions_are_straight_between_waypoints(motion, time, offset):
     ("given", "message"),
     [
         ({}, "either a velocity or waypoints"),
-        ({"velocity": (1, 0, 0), "waypoints": [(1, 0, 0, 1)]}, "either a velocity or waypoints"),
         ({"waypoints": [(2, 0, 0, 1), (1, 0, 0, 0)]}, "times of waypoints must rise"),
-        ({"waypoints": [(0, 0, 0, 1)]}, "times of waypoints must rise from above 0 s"),
         ({"waypoints": [(1, 0, 0, 1)], "periodic": True}, "ends where it begins"),
-        ({"velocity": (1, 0, 0), "periodic": True}, "ends where it begins"),
         ({"velocity": (200, 0, 0)}, "velocities 100 m/s"),
         ({"waypoints": [(1, 0, 2e4, 0)]}, "at most 10000 m"),
-        ({"waypoints": [(1, 0, 0)]}, r"waypoints\[0\] must be"),
     ],
 )
 def test_impossible_motions_are_refused(given, message):
@@ -127,10 +123,11 @@ def test_problems_survive_files(tmp_path):
 
 class TestEpisodes:
     def test_are_those_of_the_reference(self, changing):
-        _, collisions, count = compare_actions(changing, 3, 150, held=12)
+        _, collisions, count = compare_actions(changing, 3, 60, held=12)
         assert 0.3 * count < collisions < count
 
-    def test_are_those_of_the_reference_for_the_whole_motion(self):
+    def test_are_those_of_the_reference_for_the_whole_motion(self, monkeypatch):
+        monkeypatch.setattr("kinarm.reference.SAMPLES", 300)
         assert compare_actions(Simulator(busy(horizon=20)), 5, 3, tested=0)[1] > 0
 
     def test_what_moves_meets_an_arm_that_rests(self, passing):
@@ -185,7 +182,7 @@ class TestOracle:
         moving, shut = (problem(replace(gate, motion=each)) for each in (gate.motion, None))
         trials = Simulator(problem()).sample(np.random.default_rng(0), 200)
         free = ~Simulator(shut).world.in_contact(trials[0]) & (trials[1][:, 1] > 0)
-        chosen = [each[free][:12] for each in trials]
+        chosen = [each[free][:6] for each in trials]
         found, stuck = (Oracle(each, threads=1).solve_batch(*chosen) for each in (moving, shut))
         replayed = Simulator(moving).rollout_actions(found.actions, *chosen)
         np.testing.assert_array_equal(replayed.success, found.reachable)

@@ -152,7 +152,7 @@ class TestCompiledRolloutsEqualTheReference:
 
 def test_short_episodes_of_other_time_steps():
     simulator = simulator_of(horizon=7, tolerance=0.4, time_step=0.1)
-    success, collision, count = compare_actions(simulator, 11, 200, held=3)
+    success, collision, count = compare_actions(simulator, 11, 120, held=3)
     assert collision > 5
     assert success > 1
     assert count > collision + success
@@ -162,8 +162,8 @@ def test_short_episodes_of_other_time_steps():
 def test_other_numbers_of_tested_configurations(tested):
     """Steps are long, so that the number matters."""
     simulator = simulator_of(horizon=12, time_step=0.08)
-    _, collision, count = compare_actions(simulator, 12, 150, held=3, tested=tested)
-    assert 10 < collision < count - 10
+    _, collision, count = compare_actions(simulator, 12, 60, held=3, tested=tested)
+    assert 5 < collision < count - 5
 
 
 def test_obstacles_and_thick_goal_regions_of_ones_own():
