@@ -96,10 +96,8 @@ def test_show_of_an_own_urdf(run, make_joint, make_collision, write_robot, tmp_p
         (["show"], ["ARM"]),
         (["show", "nobody"], ["'nobody'", "panda"]),
         (["show", "missing.urdf"], ["missing.urdf", "does not exist"]),
-        (["show", "missing.toml"], ["missing.toml", "does not exist"]),
         (["show", "paper", "--tool-frame", "hook"], ["'hook'", "hand"]),
         (["show", "paper", "--out", "page.txt"], ["page.txt", ".html"]),
-        (["tell"], ["'tell'"]),
     ],
 )
 def test_refusals(run, arguments, words, tmp_path, monkeypatch):

@@ -7,12 +7,10 @@ import pytest
 from documents import faced
 from refusals import check_refused
 
-from kinarm.evaluation import bounds
 from kinarm.evaluation.bounds import bounds_document
 from kinarm.evaluation.evaluation import evaluate
 from kinarm.evaluation.request import EvaluationRequest
 from kinarm.evaluation.selection import select_pairs
-from kinarm.policies import Policy
 from kinarm.policies.library import best_policy
 from kinarm.problem import PROBLEMS
 
@@ -45,24 +43,6 @@ def test_policies_need_no_option(evaluated, policy_folder):
     assert evaluated(names[0], *few, "--policy", names[1])["results"] == expected
 
 
-def test_matrix_is_every_policy_on_every_problem(evaluated, policy_folder):
-    document = evaluated(
-        *("--policy", policy_folder / "lefty.npz", "--policy", "zero", "--trials", 3, "--matrix")
-    )
-    problems = tuple(PROBLEMS)
-    assert sorted(faced(document)) == sorted(
-        (name, problem) for name in ("lefty", "zero", "oracle") for problem in problems
-    )
-
-
-def test_table_for_people(run, policy_folder):
-    answer = run("kinarm-eval", "--policy", policy_folder / "lefty.npz", "--trials", 3)
-    assert (answer.status, answer.err) == (0, "")
-    for words in ("lefty", "oracle", "left", "3 trials", "seed 0", "arm paper"):
-        assert words in answer.out
-    assert evaluate("zero", "left", trials=3).trials.digest in answer.out
-
-
 def test_without_policies_all_fitting_ones_and_the_baselines_take_part(evaluated):
     names = {name for name, _ in faced(evaluated("--trials", 1, "--arm", "paper_flange"))}
     assert names == {"random", "zero", "oracle"}
@@ -92,21 +72,6 @@ def test_changes_apply_to_what_policies_were_trained_for(policy_folder):
         assert problem.digest == PROBLEMS[problem.name].replace(tolerance=0.2).digest
 
 
-def test_holding_trials_are_told_beside_the_others(run, evaluated, policy_folder):
-    arguments = ("--policy", policy_folder / "mine-seed0.npz", "--trials", 6)
-    plain, held = evaluated(*arguments), evaluated(*arguments, "--hold")
-    assert (plain["protocol"]["hold"], held["protocol"]["hold"]) == (False, True)
-    for before, after in zip(plain["results"], held["results"], strict=True):
-        assert before["metrics"]["held"] == {"value": None, "ci95": None}
-        assert 0 <= after["metrics"]["held"]["value"] <= 1
-        assert before["outcomes"] == after["outcomes"]
-        assert len(after["held"]["closest"]) == 6
-    answer = run("kinarm-eval", *arguments, "--hold")
-    for words in ("held %", "median approach m", "success does not end", "aims at 5 mm"):
-        assert words in " ".join(answer.out.split())
-    assert "held %" not in run("kinarm-eval", *arguments).out
-
-
 def test_the_best_of_each_problem(evaluated):
     arguments = ("--policy", "best", "--tolerance", 0.04, "--trials", 1, "--no-oracle")
     expected = [(best_policy(problem), problem) for problem in PROBLEMS]
@@ -129,34 +94,6 @@ def problems_of(document):
 def test_no_best_policy_for_other_arms_and_scenes(run, option):
     arguments = ("--policy", "best", "--problem", "right", *option, "--trials", 2)
     check_refused(run("kinarm-eval", *arguments), "no shipped policy is for", "left, right")
-
-
-def test_of_many_trials_the_first_are_bounded(run, evaluated, monkeypatch):
-    monkeypatch.setattr(bounds, "MOST_BOUNDED", 4)
-    arguments = ("--policy", "zero", "--problem", "left", "--trials", 9)
-    document = evaluated(*arguments)
-    assert [row["trials"] for row in document["results"]] == [9, 4]
-    assert document["protocol"]["problems"]["left"]["oracle"]["bounded"] == 4
-    said = " ".join(run("kinarm-eval", *arguments).out.split())
-    assert "are of the first 4 trials of 9; --policy oracle bounds all" in said
-    whole = evaluated(*arguments, "--policy", "oracle")
-    assert [row["trials"] for row in whole["results"]] == [9, 9]
-    assert whole["protocol"]["problems"]["left"]["oracle"]["bounded"] == 9
-
-
-def test_policies_for_other_problems_are_not_opened(evaluated, monkeypatch):
-    """The names of those that ship say what they were trained for; only files tell the mirror."""
-    opened, load = [], Policy.load.__func__
-    monkeypatch.setattr(
-        Policy, "load", classmethod(lambda cls, path: opened.append(path.stem) or load(cls, path))
-    )
-    document = evaluated("--problem", "left", "--trials", 1, "--no-oracle")
-    shown = {row["policy"] for row in document["results"]} - {"random", "zero"}
-    assert shown < set(opened)
-    assert {name.split("-seed")[0] for name in set(opened) - shown} == {
-        "ars-paper-both",
-        "ppo-paper-both",
-    }
 
 
 def compared(document) -> list[tuple[str, str, str]]:
@@ -189,18 +126,10 @@ class TestAgainst:
         assert ("lefty", "left") in faced(document)
         assert compared(evaluated(*asked)) == []
 
-    def test_nothing_is_compared_unless_it_is_named(self, evaluated):
-        asked = ("--trials", 1, "--arm", "paper_flange")
-        assert compared(evaluated(*asked)) == []
-        assert {row[:2] for row in compared(evaluated(*asked, "--against", "zero"))} == {
-            ("random", "zero")
-        }
-
     @pytest.mark.parametrize(
         ("asked", "told"),
         [
             (["--against", "nobody"], "unknown policy 'nobody'"),
-            (["--policy", "zero", "--against", "nobody"], "unknown policy 'nobody'"),
             (["--policy", "ppo-paper-left", "--against", "ppo-paper-right"], "nobody else faces"),
             (["--policy", "zero", "--against", "zero"], "nobody else faces"),
         ],

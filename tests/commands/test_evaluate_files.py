@@ -10,14 +10,6 @@ from kinarm.evaluation import bounds
 from kinarm.evaluation.document import EvaluationDocument
 
 
-def test_folder_is_created_and_filled(run, policy_folder, tmp_path):
-    out = tmp_path / "deep" / "results"
-    arguments = ("--policy", policy_folder / "mine-seed0.npz", "--trials", 4, "--out", out)
-    answer = run("kinarm-eval", *arguments, "--json")
-    assert {path.name for path in out.iterdir()} == {"evaluation.json"}
-    assert json.loads((out / "evaluation.json").read_text()) == json.loads(answer.out)
-
-
 def test_earlier_results_are_replaced_when_asked_for(run, tmp_path):
     (tmp_path / "evaluation.json").write_text("old")
     (tmp_path / "notes.txt").write_text("mine")

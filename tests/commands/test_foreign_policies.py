@@ -7,8 +7,6 @@ import numpy as np
 import pytest
 from refusals import check_refused
 
-from kinarm.policies import Policy, load_policy
-
 
 @pytest.fixture
 def here(tmp_path, monkeypatch):
@@ -98,15 +96,3 @@ class TestCard:
         assert (here / "mine.md").read_text() == text.replace(
             "--card mine.md", "--card mine.md --overwrite"
         )
-
-    def test_of_a_model(self, run, saved):
-        answer = run(
-            *("kinarm-eval", "--policy", saved, "--problem", "right", "--trials", 4),
-            *("--no-oracle", "--card", "share/mine.md"),
-        )
-        assert answer.status == 0, answer.err
-        beside = load_policy("share/mine.npz")
-        own = Policy.from_sb3(saved, "right", saved.with_name("model_vecnormalize_20_steps.pkl"))
-        seen = np.random.default_rng(0).normal(size=(10, 48))
-        np.testing.assert_array_equal(beside(seen), own(seen))
-        assert "| algorithm | `ppo` |" in saved.with_name("share").joinpath("mine.md").read_text()

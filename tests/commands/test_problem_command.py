@@ -9,13 +9,6 @@ from refusals import check_refused
 from kinarm.problem import PROBLEMS, ReachProblem
 from kinarm.problem_files import problem_names
 
-FREE = """
-[[scene.obstacles]]
-name = "post"
-lower = [0.4, -0.05, 0.0]
-upper = [0.5, 0.05, 0.3]
-yaw = 0.4
-"""
 FAR = """
 [[goal_regions]]
 name = "near"
@@ -113,17 +106,12 @@ def test_check_says_what_is_out_of_reach(run, write, tmp_path):
 
 
 @pytest.mark.parametrize(
-    "command", ["kinarm-problem check", "kinarm-train ars --out x.npz --problem"]
-)
-@pytest.mark.parametrize(
     ("text", "words"),
     [
         (AROUND, ["cannot move", "shoulder touches box"]),
         (SHAFT, ["cannot move: it touches something at all of 2000"]),
         ("[[scene.obstacles]\n", ["line 1, column 18"]),
-        ('arm = "nobody"', ["'nobody'", "panda"]),
         ('arm = "gone.urdf"', ["gone.urdf", "does not exist"]),
-        ('scene = "nowhere"', ["'nowhere'", "shelf"]),
         ('task = "gone.toml"', ["gone.toml"]),
         ('[arm]\nsource = "paper"\n[arm.held]\naxis_9 = 1.0', ["'axis_9'", "axis_1"]),
         (
@@ -133,10 +121,10 @@ def test_check_says_what_is_out_of_reach(run, write, tmp_path):
         ),
     ],
 )
-def test_refusals(run, write, tmp_path, command, text, words):
+def test_refusals(run, write, tmp_path, text, words):
     path = write(text)
-    program, *arguments = command.split()
-    check_refused(run(program, *arguments, path), *words)
+    check_refused(run("kinarm-problem", "check", path), *words)
+    check_refused(run("kinarm-train", "ars", "--out", "x.npz", "--problem", path), *words)
     assert [file.name for file in tmp_path.iterdir()] == ["mine.toml"]
 
 
@@ -144,14 +132,9 @@ def test_refusals(run, write, tmp_path, command, text, words):
     ("arguments", "words"),
     [
         (["check", "nothing"], ["'nothing'", "shelf-panda"]),
-        (["check", "both", "--trials", "0"], ["trials", "at least 1"]),
-        (["check", "both", "--seed", "-1"], ["seed"]),
         (["check", "both", "--picture", "a.jpg"], ["a.jpg", ".png"]),
         (["check", "both", "--json", "a.txt"], ["a.txt", ".json"]),
-        (["show", "gone.toml"], ["gone.toml"]),
-        (["show", "--arm", "missing.urdf"], ["missing.urdf"]),
         (["show", "--tool-frame", "hook"], ["'hook'"]),
-        (["list", "both"], ["both"]),
     ],
 )
 def test_bad_usage(run, write, tmp_path, arguments, words):
@@ -216,8 +199,6 @@ class TestImport:
             (["pairs"], ["--arm", "--out"]),
             (["empty", "--arm", "paper", "--out", "made"], ["empty", "no folder"]),
             (["pairs", "--arm", "nobody", "--out", "made"], ["'nobody'"]),
-            (["pairs/scene1.yaml", "gone", "--arm", "paper", "--out", "made"], ["'gone'"]),
-            (["pairs", "--arm", "panda.urdf", "--out", "made"], ["panda.urdf"]),
         ],
     )
     def test_refusals(self, run, pairs, tmp_path, words, said):

@@ -86,9 +86,7 @@ class TestQuick:
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        (("--jobs", 0), "must be a whole number of at least 1"),
         (("--out", "other"), "is of the experiment 'reproduction', not of 'reproduction_quick'"),
-        (("--out", "file"), "cannot write"),
         (("--ray", "local", "--slurm"), "exclude each other"),
     ],
 )

@@ -9,7 +9,6 @@ import time
 from dataclasses import asdict
 from pathlib import Path
 
-import numpy as np
 import pytest
 from equal_policies import check_equal
 
@@ -131,19 +130,6 @@ def test_an_earlier_policy_is_replaced_on_demand_alone(run, tmp_path):
     assert out.read_bytes() == before
     assert run(*arguments, "--seed", 1, "--overwrite").status == 0
     assert Policy.load(out).provenance.seed == 1
-
-
-def test_resumed_is_uninterrupted(run, tmp_path):
-    config = recipe("ars", "tuned", iterations=9, directions=4, top_directions=4, episodes=2)
-    out = tmp_path / "p.npz"
-    stop_after(7, config, tmp_path / "p.checkpoint.npz")
-    assert run("kinarm-train", "ars", "--out", out, "--resume").status == 0
-    expected = train_policy(config)
-    check_equal(Policy.load(out), expected.policy)
-    rows = read_curve(tmp_path / "p.curve.csv")
-    returns = [float(row["mean_return"]) for row in rows]
-    np.testing.assert_array_equal(returns, [point.mean_return for point in expected.curve])
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["p.curve.csv", "p.npz"]
 
 
 @pytest.mark.parametrize(

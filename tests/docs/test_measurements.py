@@ -9,7 +9,7 @@ import pytest
 from known_arms import INSTALLED
 from numba import njit
 
-from docs.measurements import limits, motionbenchmaker
+from docs.measurements import motionbenchmaker
 from docs.measurements.counting import OperationCounter
 from docs.measurements.mjcf import mjcf
 from kinarm.arm import Arm
@@ -64,16 +64,6 @@ class TestOperations:
         weights, inputs, outputs = np.zeros(49 * 5), np.zeros((1, 48)), np.zeros((1, 5))
         found = counted(affine_layer.py_func, weights, 0, 48, 5, inputs, 0, outputs, 0)
         assert found == {"sums": 48 * 5, "products": 48 * 5}
-
-    def test_attainable_rate_multiplies_and_adds_in_every_lane(self):
-        space = np.zeros((2 + limits.CHAINS, LANES))
-        space[0], space[1] = 0.5, 3.0
-        space[2:] = np.arange(limits.CHAINS * LANES, dtype=float).reshape(limits.CHAINS, LANES)
-        expected = space[2:].copy()
-        limits.multiply_and_add(10, space)
-        for _ in range(10):
-            expected = expected * 0.5 + 3.0
-        assert np.array_equal(space[2:], expected)
 
 
 class TestMuJoCo:

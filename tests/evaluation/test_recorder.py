@@ -2,7 +2,7 @@
 
 import pytest
 
-from kinarm.errors import InvalidInputError, PolicyFileError
+from kinarm.errors import PolicyFileError
 from kinarm.evaluation import Contestant, TrialSet, find_contestants, oracle_bounds, record
 from kinarm.evaluation.evaluation import run_trials
 from kinarm.problem import ReachProblem
@@ -41,8 +41,3 @@ def test_another_arm(skilled):
         record(contestant, trials)
     (recording,) = record(contestant, trials, allow_other_arm=True)
     assert recording.problem.arm.name == "paper_flange"
-
-
-def test_no_such_trial(trials):
-    with pytest.raises(InvalidInputError, match="no trial 60: there are 0 to 59"):
-        record(find_contestants("zero")[0], trials, [60])

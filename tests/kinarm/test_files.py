@@ -57,15 +57,6 @@ def test_a_link_stays_and_its_file_is_written(tmp_path):
     assert list(real.parent.iterdir()) == [real]
 
 
-def test_a_pipe_gets_the_content(tmp_path):
-    pipe = tmp_path / "pipe"
-    os.mkfifo(pipe)
-    reader = os.open(pipe, os.O_RDONLY | os.O_NONBLOCK)
-    write_atomically(pipe, lambda file: file.write(b"content"))
-    assert os.read(reader, 100) == b"content"
-    os.close(reader)
-
-
 def _write_slowly(path):
     def write(file):
         file.write(b"half")
@@ -141,10 +132,6 @@ def test_a_folder_is_made_unless_a_file_is_in_the_way(tmp_path):
 
 
 class TestCheckOutput:
-    def test_makes_the_folder(self, tmp_path):
-        check_output(tmp_path / "a" / "b" / "new.npz")
-        assert list((tmp_path / "a").glob("**/*")) == [tmp_path / "a" / "b"]
-
     def test_existing_file_has_to_be_given_up(self, tmp_path):
         path = tmp_path / "old.npz"
         path.write_text("old")

@@ -163,10 +163,8 @@ def test_children_that_are_kept_from_it(run):
     ("program", "words", "expected"),
     [
         ("/x/kinarm-eval", ["python", "/x/kinarm-eval", "--help"], True),
-        ("/x/kinarm-eval", ["python", "-c", "..."], False),
         ("-m", ["python", "-m", "kinarm.viewer"], True),
         ("-m", ["python", "-X", "importtime", "-Im", "kinarm"], True),
-        ("-m", ["python", "-m", "kinarmor"], False),
         (None, ["python"], False),
     ],
 )

@@ -313,8 +313,6 @@ POINT = [0.1, -0.5, 0.4]
         ({"targets": POINT, "tool_axis": [0, 0, 1]}, "only with directions"),
         ({"targets": POINT, "directions": np.ones((2, 3))}, "2 for 1"),
         ({"targets": POINT, "near": np.full(6, 7.0)}, "near lies outside the limits"),
-        ({"targets": POINT, "joints": 7}, "joints must be at most 6, got 7"),
-        ({"targets": POINT, "separation": 0.0}, "separation must be greater than 0"),
     ],
 )
 def test_refusals_are_one_line(simulator, given, message):

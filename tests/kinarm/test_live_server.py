@@ -11,7 +11,6 @@ import umsgpack
 from live_pages import commands
 from meshcat.geometry import Box
 
-from kinarm.errors import InvalidInputError, OutputError
 from kinarm.viewer.drawing import DrawnScene
 from kinarm.viewer.live_server import LiveServer
 
@@ -115,9 +114,7 @@ class TestRequests:
         [
             (get("/?x=1"), b"200"),
             (get("/live_page.js"), b"text/javascript"),
-            (get("/meshcat.js"), b"text/javascript"),
             (get("/../../etc/passwd"), b"404"),
-            (get("/").replace(b"GET", b"POST"), b"501"),
             (b"\xff\x00\r\n\r\n", b"400"),
         ],
     )
@@ -131,17 +128,6 @@ class TestPorts:
     def test_the_next_free_one(self, server):
         with LiveServer(server.port) as other:
             assert other.port > server.port
-
-    def test_a_number_that_is_none(self):
-        with pytest.raises(InvalidInputError, match="port must be"):
-            LiveServer(65536)
-
-    def test_none_is_free(self):
-        with socket.socket() as taken:
-            taken.bind(("127.0.0.1", 65535))
-            taken.listen()
-            with pytest.raises(OutputError, match="cannot serve on port 65535: Address already"):
-                LiveServer(65535)
 
     def test_closed_again_and_opened_again(self):
         with LiveServer(0) as server:

@@ -11,7 +11,7 @@ from known_arms import EACH_ARM, INSTALLED
 
 from kinarm.arm import Arm
 from kinarm.errors import ArmError, MissingExtraError
-from kinarm.viewer import arm_page, visual_shapes
+from kinarm.viewer import visual_shapes
 from kinarm.viewer.meshes import Mesh, box
 from kinarm.viewer.parts import shape_finish
 from kinarm.viewer.visual_shapes import (
@@ -212,11 +212,6 @@ class TestWithoutTheExtra:
             f"{arm.name} is shown by its collision shapes: trimesh is not installed: "
             "pip install 'kinarm[robots]'"
         ]
-
-
-@INSTALLED
-def test_pages_are_small():
-    assert len(arm_page(Arm.load("panda")).html.encode()) < 5_000_000
 
 
 @INSTALLED

@@ -110,13 +110,7 @@ def test_what_is_no_mesh_is_refused(tmp_path, name):
     assert "\n" not in str(caught.value)
 
 
-def test_the_reason_of_a_refused_mesh_is_told(tmp_path):
-    (tmp_path / "empty.stl").write_bytes(bytes(84))
-    with pytest.raises(ArmError, match=r"'empty.stl' cannot be loaded: .*no facets defined"):
-        hulls_of_mesh(tmp_path / "empty.stl", np.ones(3))
-
-
-@pytest.mark.parametrize(("number", "reason"), [("nan", "away"), ("1e30", "away"), ("0", "volume")])
+@pytest.mark.parametrize(("number", "reason"), [("nan", "away"), ("0", "volume")])
 def test_meshes_that_are_refused(tmp_path, number, reason):
     corners = [(0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, number)]
     faces = "f 1 2 3\nf 1 2 4\nf 1 3 4\nf 2 3 4\n"
@@ -131,7 +125,6 @@ def test_meshes_that_are_refused(tmp_path, number, reason):
     [
         ("<float_array>1.0 two 3.0</float_array>", "<float_array> holds what is no"),
         ('<float_array count="-1">1.0</float_array>', "count of <float_array> is no"),
-        ('<float_array stride="99999999">1.0</float_array>', "stride of <float_array> is no"),
     ],
 )
 def test_collada_that_would_end_the_process(tmp_path, content, reason):

@@ -92,7 +92,6 @@ def with_objects(*objects, **more):
         (BOX, "box", (0.1, 0.2, 0.3)),
         ({"type": "sphere", "dimensions": [0.1]}, "sphere", (0.1,)),
         ({"type": "cylinder", "dimensions": [0.5, 0.03]}, "cylinder", (0.03, 0.5)),
-        ({"type": "cylinder", "dimensions": ["5e-1", 0.03]}, "cylinder", (0.03, 0.5)),
     ],
 )
 def test_primitives_have_their_sizes(imported, primitive, shape, size):
@@ -190,10 +189,7 @@ IN_GOAL = (*GOALS, "joint_constraints", 0)
     ("keys", "value", "words"),
     [
         (("world",), None, ["'world' is missing"]),
-        (("world",), 3, ["world: must be a table, got 3"]),
         (("world", "octomap"), {"id": "tree"}, ["world: 'octomap' cannot be imported"]),
-        (("world", "collision_objects"), 3, ["world.collision_objects: must be a list"]),
-        (OBJECT, "no", ["world.collision_objects[0]: must be a table"]),
         ((*OBJECT, "id"), None, ["collision_objects[0]: 'id' is missing"]),
         ((*OBJECT, "planes"), [{}], ["'planes' cannot be imported"]),
         (
@@ -201,19 +197,10 @@ IN_GOAL = (*GOALS, "joint_constraints", 0)
             {"frame_id": "shelf"},
             ["'shelf' is none of the fixed frames world, table"],
         ),
-        ((*OBJECT, "primitives"), None, ["0 primitives and meshes, and 1 poses"]),
-        ((*OBJECT, "primitives"), [3], ["primitives[0]: must be a table"]),
-        ((*OBJECT, "pose"), {"position": [0, 0, 0]}, ["[0].pose: 'orientation' is missing"]),
         ((*PRIMITIVE, "type"), "cone", ["primitives[0]: type 'cone'", "box, sphere, cylinder"]),
-        ((*PRIMITIVE, "type"), "mesh", ["'vertices' is missing"]),
-        ((*PRIMITIVE, "dimensions"), None, ["primitives[0]: 'dimensions' is missing"]),
-        ((*PRIMITIVE, "dimensions"), [1, 2], ["primitives[0].dimensions must have shape (3)"]),
         ((*PRIMITIVE, "dimensions"), [0, 1, 1], ["primitives[0]: box 'thing': x must be"]),
         ((*POSE, "position"), [0, 0, "a"], ["primitive_poses[0].position must be numbers"]),
-        ((*POSE, "position"), [0, 0, math.nan], ["position must be finite"]),
         ((*POSE, "orientation"), [0, 0, 0, 0], ["orientation: must be a quaternion of length 1"]),
-        (("fixed_frame_transforms", 0, "child_frame_id"), None, ["'child_frame_id' is missing"]),
-        (("fixed_frame_transforms", 0, "transform"), None, ["transforms[0]: 'transform'"]),
     ],
 )
 def test_refused_scenes(imported, keys, value, words):
@@ -226,16 +213,11 @@ def test_refused_scenes(imported, keys, value, words):
     ("keys", "value", "words"),
     [
         (("start_state",), None, ["'start_state' is missing"]),
-        ((*STATE, "position"), None, ["start_state.joint_state: 'position' is missing"]),
         ((*STATE, "position"), [1, 2], ["joint_state.position must have shape (7), got (2,)"]),
         ((*STATE, "name", 2), "other", [f"joint_state: {NAMES[-2]} of arm 'paper' is missing"]),
         ((*STATE, "position", 1), 99.0, ["joint_state lies outside the limits", NAMES[-1]]),
-        (("goal_constraints",), None, ["'goal_constraints' must have one member, got 0"]),
         ((*GOALS, "position_constraints"), [1], ["'position_constraints' cannot be imported"]),
-        ((*GOALS, "joint_constraints"), None, [f"{', '.join(NAMES)} of arm 'paper' is missing"]),
         ((*IN_GOAL, "position"), "up", ["joint_constraints[0].position must be numbers"]),
-        ((*IN_GOAL, "joint_name"), None, ["joint_constraints[0]: 'joint_name' is missing"]),
-        (("path_constraints",), {"name": "up"}, ["'path_constraints' cannot be imported"]),
         (
             ("start_state", "attached_collision_objects"),
             [{"link_name": "nail", "object": an_object(header={"frame_id": "world"})}],
@@ -249,7 +231,7 @@ def test_refused_requests(imported, keys, value, words):
     assert all(word in str(refused.value) for word in ["request1.yaml: ", *words]), refused.value
 
 
-@pytest.mark.parametrize("text", ["a: [1", "\t", "a: \x00", "[" * 200_000, "- 1", ""])
+@pytest.mark.parametrize("text", ["a: [1", "\t", "[" * 200_000, ""])
 def test_files_that_are_no_table(imported, text):
     with pytest.raises(InvalidInputError, match=r"scene1\.yaml"):
         imported(text)

@@ -5,7 +5,7 @@ import dataclasses
 import pytest
 
 from kinarm.arm import Arm, ArmSpecification
-from kinarm.errors import ArmError, InvalidInputError, ProblemError, UnknownNameError
+from kinarm.errors import ArmError, ProblemError, UnknownNameError
 from kinarm.problem import PROBLEMS
 from kinarm.problem_options import ProblemOptions, say_choices
 from kinarm.scene import Scene
@@ -56,8 +56,6 @@ class TestReplace:
                 "setting of a problem 'horizons' .did you mean 'horizon'",
             ),
             ({"reward": {"bonus": 1}}, UnknownNameError, "reward term 'bonus'; available: prog"),
-            ({"tolerance": "wide"}, InvalidInputError, r"tolerance must be a number \[m\]"),
-            ({"arm": "nope"}, UnknownNameError, "arm 'nope'; available: .*paper"),
             ({"scene": Scene(goal_regions=())}, ProblemError, "needs at least one goal region"),
         ],
     )

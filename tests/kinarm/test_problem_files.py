@@ -101,9 +101,6 @@ class TestFile:
             ("[task]\nhorizons = 3", "unknown key 'task.horizons' .did you mean 'horizon'"),
             ('[task]\ntolerance = "5 cm"', r"task.tolerance must be a number \[m\], got '5 cm'"),
             ("[task.reward]\ncollision = 1", "task.reward: .*collision = 1 rewards contact"),
-            ('[task]\ngoal_regions = ["up"]', "goal region in task.goal_regions: 'up'"),
-            ('base = "up"', "base must be one of left, right, both, got 'up'"),
-            ("[task", r"not a problem file: .* \(at end of document\)"),
             ("a" + 100 * ".a", "not a problem file: a key has more than 100 parts"),
             (
                 '[[scene.obstacles]]\nname = "post"\nlower = [0, 0, 0]',
@@ -183,7 +180,6 @@ class TestScenesAndTasks:
         ("text", "message"),
         [
             ("ground = true", "'goal_regions' is missing"),
-            ("ground = ", r"not a scene file: .*\(at end of document"),
             (BOX.replace("yaw = 0.5", "yaw = inf"), "yaw"),
         ],
     )

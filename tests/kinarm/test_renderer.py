@@ -134,20 +134,6 @@ class TestLight:
         lit = renderer.render(aside, GOAL)[row, column].astype(int)
         assert (lit - upright > 25).all()
 
-    def test_sunlit_surfaces_do_not_shadow_themselves(self):
-        """The tops of the benches are even: none of the pattern that rounding would make."""
-        camera = Camera((0.0, -0.65, 2.0), (0.0, -0.65, 0.3), 20.0)
-        renderer = Renderer("left", width=200, height=100, camera=camera)
-        picture = renderer.render(np.deg2rad([90, -30, 0, 0, 0, 0]), (0, 0.65, 0.325))
-        patch = picture[5:95, 92:108].astype(int)
-        assert patch.std(axis=(0, 1)).max() < 1.5
-
-    def test_edges_are_smooth(self, renderer):
-        """On an edge between two even areas, there are shades between their colours."""
-        picture = renderer.render(BENT, GOAL).astype(int)
-        changes = np.abs(np.diff(picture[..., 2], axis=1))
-        assert ((changes > 5) & (changes < 60)).sum() > (changes >= 60).sum()
-
 
 class TestOutcomes:
     def test_cube_lights_up_on_success(self, renderer):
@@ -186,15 +172,6 @@ class TestPictures:
             again = other.render(BENT, GOAL, trace=trace, outcome="success")
             np.testing.assert_array_equal(again, first)
 
-    def test_of_other_arms(self, simulators):
-        for name in ("sliding", "mesh", "lrmate200ic_5l"):
-            simulator = simulators[name]
-            renderer = Renderer(simulator.problem, width=80, height=60)
-            first, second = (
-                renderer.render(q, GOAL) for q in simulator.sample(np.random.default_rng(0), 2)[0]
-            )
-            assert (first != second).any()
-
     @pytest.mark.parametrize("place", [(0.0, -0.65, 0.2), (0.0, 0.0, 0.5), (-2.0, -1.0, -0.5)])
     def test_camera_in_a_bench_in_the_arm_and_under_the_floor(self, place):
         camera = Camera(place, (0.1, 0, 0.3))
@@ -219,7 +196,6 @@ class TestCamera:
         ("camera", "message"),
         [
             ("above", "camera must be a Camera, got 'above'; expected position, target"),
-            ({"position": (1, 2, 3), "target": (0, 0, 0), "zoom": 2}, "'zoom'.*field_of_view"),
             ([[1, 2, 3], [0, 0, math.nan]], "camera's target must be finite"),
             ([[1, 2, 3], [1, 2, 3]], "position and target are the same"),
             ([[1, 2, 3], [0, 0, 0], 180], "field_of_view must be between 0 and 180 degrees"),

@@ -54,12 +54,6 @@ def test_columns_leave_by_priority_and_are_named():
     assert [line.split() for line in printed(rows, 22, whole=True)][-1] == ["a", "1.0", "2.0", "3"]
 
 
-def test_groups_of_rows_stand_apart():
-    console = Console(file=io.StringIO(), width=80)
-    print_columns(COLUMNS, [[("a", 1.0, 2.0, 3)], [("b", 1.0, 2.0, 3)]], console)
-    assert [line[:1] for line in console.file.getvalue().splitlines()] == ["t", "a", " ", "b"]
-
-
 def test_names_choose_columns_after_the_labels():
     chosen = TableOptions(columns=("steps", "success")).chosen(COLUMNS)
     assert [column.name for column in chosen] == ["trainings", "steps", "success"]

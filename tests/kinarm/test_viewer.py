@@ -17,8 +17,7 @@ from kinarm.errors import InvalidInputError, OutputError
 from kinarm.problem import ReachProblem
 from kinarm.recording import record_rollouts
 from kinarm.scene import GoalRegion, Obstacle, Scene, rotation_matrix
-from kinarm.viewer import Camera, arm_page, replay_page
-from kinarm.viewer.camera import stage_scale
+from kinarm.viewer import arm_page, replay_page
 from kinarm.viewer.meshes import Mesh, box, capsule, cylinder, housing, lathe, tube
 from kinarm.viewer.parts import obstacle_meshes
 from kinarm.viewer.visual_shapes import arm_parts
@@ -81,13 +80,6 @@ def test_obstacles_need_no_goals(recordings):
     page = replay_page(changed(recordings[0], scene=bare))
     paths = {command["path"] for command in commands(page)}
     assert not any("obstacles" in path or "floor" in path for path in paths)
-
-
-def test_ghosts(recordings, simulator):
-    page = replay_page(recordings, ghosts=waving(simulator, seed=1))
-    runs = json.loads(unpacked(page, "page"))["trials"][0]["runs"]
-    assert [run["policy"] for run in runs] == ["wave-0", "wave-1"]
-    assert "<title>wave-0 and wave-1 · kinarm replay</title>" in page.html
 
 
 def test_names_are_escaped(recordings):
@@ -202,15 +194,3 @@ def test_corners_are_kept_to_a_65534th_of_the_size(recordings):
     for drawn, meshes in zip(vertices, by_joint.values(), strict=True):
         exact = Mesh.joined(meshes).vertices
         np.testing.assert_allclose(drawn, exact, atol=np.ptp(exact, axis=0).max() / 65534)
-
-
-def test_small_stages_are_seen_from_nearer_by():
-    camera, arm = Camera.of_replays(ReachProblem.load("left")), Arm.load("paper")
-    small = Scene(goal_regions=(GoalRegion(name="left", lower=(0, 0, 0), upper=(0.1, 0.1, 0)),))
-    assert stage_scale(arm, small) == stage_scale(arm, Scene()) == 1
-    short = replace(arm, chain=arm.chain._replace(translation=arm.chain.translation / 4))
-    assert 0.2 < stage_scale(short, small) < 0.5
-    far = GoalRegion(name="left", lower=(0, 0, 0), upper=(2.9, 0, 0.0001))
-    assert stage_scale(arm, Scene(goal_regions=(far,))) == pytest.approx(2, rel=1e-3)
-    near = ReachProblem.load("left").replace(scene=small)
-    assert Camera.of_replays(near, short).position[0] > camera.position[0]

@@ -2,7 +2,6 @@
 
 import gc
 import json
-import pickle
 from dataclasses import replace
 
 import numpy as np
@@ -60,11 +59,6 @@ def test_round_trip(saved, state):
 def test_before_the_first_iteration(state, tmp_path):
     save_checkpoint(tmp_path / "new.ckpt", TINY, replace(state, curve=()))
     assert load_checkpoint(tmp_path / "new.ckpt")[1].iteration == 0
-
-
-def test_pickle_is_no_checkpoint(saved):
-    saved.write_bytes(pickle.dumps({"theta": 1}))
-    refused(saved)
 
 
 def test_policy_is_no_checkpoint(saved, make_policy):

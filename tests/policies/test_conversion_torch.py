@@ -81,13 +81,9 @@ def test_says_where_it_comes_from(tmp_path):
     ("module", "message"),
     [
         (nn.Linear(47, 5), "takes 47 inputs where 48 arrive"),
-        (nn.Linear(48, 6), "gives 6 numbers; arm 'paper' takes 5"),
         (nn.Sequential(nn.Linear(48, 5), nn.GELU()), r"cannot convert GELU\(.*; what can be"),
-        (nn.Sequential(nn.LayerNorm(48), nn.Linear(48, 5)), "cannot convert LayerNorm"),
         (nn.Sequential(nn.Linear(48, 5), nn.ELU(0.5)), r"cannot convert ELU\(alpha=0.5\)"),
-        (nn.Sequential(nn.Linear(48, 5), nn.LeakyReLU(0.2)), "cannot convert LeakyReLU"),
         (nn.Sequential(nn.Linear(48, 5), nn.Dropout(0.5)), "Dropout.*after eval"),
-        (nn.LSTM(48, 5), "cannot convert LSTM"),
         (lambda x: x, "cannot convert <function"),
     ],
 )

@@ -3,9 +3,8 @@
 import numpy as np
 import pytest
 
-from kinarm.envs.goal import GoalInterface, ReachGoalEnv
+from kinarm.envs.goal import GoalInterface
 from kinarm.errors import InvalidInputError
-from kinarm.policies import load_policy
 from kinarm.policies.policy import flat_observation
 
 
@@ -34,28 +33,11 @@ def test_arms_of_other_joints(any_simulator):
     ("change", "message"),
     [
         ({"mood": [1.0]}, "has the keys observation, achieved_goal, desired_goal, got .*mood"),
-        ({"desired_goal": None}, "desired_goal must"),
         ({"achieved_goal": np.zeros((2, 3))}, r"achieved_goal must have shape \(3\)"),
         ({"observation": np.zeros(48)}, r"observation must have shape \(42\)"),
-        ({"achieved_goal": [np.nan, 0, 0]}, "achieved_goal must be finite"),
     ],
 )
 def test_others_are_refused(shown, change, message):
     one = {name: part[0] for name, part in shown[1].items()}
     with pytest.raises(InvalidInputError, match=message):
         flat_observation({**one, **change}, shown[2])
-
-
-class TestPredict:
-    def test_drives_a_goal_conditioned_environment(self):
-        env, policy = ReachGoalEnv("right"), load_policy("ppo-tuned-both")
-        reached = []
-        for seed in range(8):
-            observation, _ = env.reset(seed=seed)
-            over = False
-            while not over:
-                action, _ = policy.predict(observation)
-                observation, _, terminated, truncated, info = env.step(action)
-                over = terminated or truncated
-            reached.append(info["is_success"])
-        assert sum(reached) >= 6

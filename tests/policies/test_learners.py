@@ -6,9 +6,7 @@ from pathlib import Path
 import pytest
 
 from kinarm.errors import InvalidInputError
-from kinarm.evaluation.commands import train
 from kinarm.policies import (
-    Policy,
     TrainingConfig,
     find_learner,
     learner_names,
@@ -28,13 +26,6 @@ def toy(monkeypatch):
     monkeypatch.syspath_prepend(TOY.parent)
     monkeypatch.setattr(learners, "_installed", lambda: {"toy": "toy_learner:LEARNER"})
     return importlib.import_module("toy_learner")
-
-
-def command(*arguments):
-    """Run ``kinarm-train toy``; returns its exit status."""
-    with pytest.raises(SystemExit) as stopped:
-        train.main(["toy", *map(str, arguments)])
-    return stopped.value.code
 
 
 def test_names():
@@ -101,31 +92,9 @@ def test_its_checkpoints_resume_exactly(toy, tmp_path, stopped_after):
     assert resumed.policy.provenance == whole.policy.provenance
 
 
-def test_the_command_trains_it_and_goes_on(toy, tmp_path, capsys):
-    out = tmp_path / "p.npz"
-    config = recipe("toy", "wide", iterations=4, seed=3)
-    states = []
-    whole = train_policy(config, on_iteration=states.append)
-    save_checkpoint(tmp_path / "p.checkpoint.npz", config, states[1])
-    assert command("--out", out, "--resume") == 0
-    again = ("--recipe", "wide", "--iterations", 4, "--seed", 3)
-    assert command("--out", tmp_path / "q.npz", *again) == 0
-    for path in (out, tmp_path / "q.npz"):
-        weights = Policy.load(path).layers[0].weights
-        assert weights.tobytes() == whole.policy.layers[0].weights.tobytes()
-    assert "4 iterations" in capsys.readouterr().out
-
-
 def test_its_options_are_its_own(toy):
     with pytest.raises(InvalidInputError, match="toy has no option 'threads'"):
         train_policy(recipe("toy"), threads=2)
-
-
-def test_a_result_describes_itself_in_a_line():
-    result = train_policy(recipe("ars", "paper", problem="left", iterations=3))
-    assert repr(result).startswith("TrainingResult(Policy(ars paper*, problem 'left', seed 0")
-    assert "3 iterations, 0.0" in repr(result)
-    assert len(repr(result)) < 130
 
 
 def test_what_settings_say_of_a_training_if_a_learner_says_no_more():

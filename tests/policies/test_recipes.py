@@ -5,7 +5,7 @@ from dataclasses import fields, replace
 
 import pytest
 
-from kinarm.errors import InvalidInputError, KinarmError, UnknownNameError
+from kinarm.errors import InvalidInputError, UnknownNameError
 from kinarm.policies import find_learner, recipe
 from kinarm.problem import PROBLEMS
 from kinarm.task import RewardWeights
@@ -58,18 +58,6 @@ def test_weights_replace_those_of_the_task_if_the_recipe_has_none():
     problem = PROBLEMS["left"].replace(reward={"step": -0.5})
     changed = recipe("ars", "paper", problem=problem, reward={"success": 2.0})
     assert changed.reward == RewardWeights(step=-0.5, success=2.0)
-
-
-def test_unknown_weight():
-    with pytest.raises(UnknownNameError, match="'bonus'; available: progress, closer, step"):
-        recipe("ars", reward={"bonus": 1})
-
-
-@pytest.mark.parametrize("weights", [{"collision": 2.0}, {"success": -1.0}])
-def test_rewarding_contact_or_punishing_success_is_refused(weights):
-    with pytest.raises(KinarmError, match="other sign"):
-        recipe("ars", "tuned", reward=weights)
-    assert recipe("ars", "tuned", reward={**weights, "allow_perverse": True})
 
 
 class TestPPO:
@@ -138,14 +126,11 @@ class TestFile:
         ("text", "words"),
         [
             ("speed = 3", "mine.toml: unknown key 'speed' .did you mean 'seed'"),
-            ("iterations = 0", "mine.toml: iterations must be .* at least 1, got 0"),
             ("[reward]\nbonus = 1", "mine.toml: unknown key 'reward.bonus'; available: progress"),
-            ("[reward]\ncollision = 2", "mine.toml: reward: .*rewards contact"),
             (
                 'base = "precise"',
                 "mine.toml: base must be one of paper, tuned, linear, best, v1, brs, got 'precise'",
             ),
-            ("problem = 3", "mine.toml: problem must be the name or file of a problem, got 3"),
             ("noise =", "mine.toml: not a recipe file: "),
         ],
     )

@@ -140,7 +140,6 @@ class TestOptions:
             ({"jobs": 0}, "jobs must be a whole number of at least 1"),
             ({"ray": "auto", "slurm": True}, "--ray and --slurm exclude each other"),
             ({"jobs": 2, "slurm": True}, "--jobs is for this machine"),
-            ({"bundle": 2}, "--bundle goes with --slurm"),
         ],
     )
     def test_refused(self, given, words):

@@ -48,14 +48,6 @@ def experiment(tmp_path):
 
 
 class TestFile:
-    def test_what_it_says(self, experiment, tmp_path):
-        assert experiment.name == "steps"
-        assert experiment.learners == ("ars",)
-        assert experiment.problems == ("right", str(tmp_path / "own.toml"))
-        assert experiment.trials.count == 50
-        assert experiment.fixed == {"iterations": 7, "reward.success": 2.0}
-        assert list(experiment.grid) == ["step_size", "problem.task.start_spread"]
-
     def test_written_and_read_again(self, experiment):
         assert Experiment.from_json(experiment.to_json(), "it") == experiment
 
@@ -95,10 +87,6 @@ class TestChoices:
         assert 0.9 < logs[-1] <= 1
         assert logs[200] == pytest.approx(-1, abs=0.4)
 
-    def test_shipped_ones_are_found_by_name(self):
-        with pytest.raises(InvalidInputError, match="unknown experiment 'nothing'; available: "):
-            Experiment.load("nothing")
-
 
 TOY = {"learner": "ars", "recipe": "tuned"}
 
@@ -111,24 +99,17 @@ TOY = {"learner": "ars", "recipe": "tuned"}
             {"entries": [{**TOY, "fixed": {"noise": 1}, "grid": {"noise": [1]}}]},
             "'noise' stands in",
         ),
-        ({"entries": [{**TOY, "grid": {"noise": 1}}]}, "grid.noise must be a list"),
-        ({"trials": {"curve": {"points": 0}}}, "points must be a whole number of at least 1"),
         ({"trials": {"curve": {"spacing": "wide"}}}, "trials.curve.spacing must be"),
-        ({"seeds": 0}, "seeds must be a whole number of at least 1, got 0"),
-        ({"learners": []}, "learners must not be empty"),
         ({"problems": ["right", "right"]}, "problems names the same twice: right, right"),
         ({"grid": {"noise": []}}, "grid.noise must be a list of at least one value, got []"),
         ({"grid": {"noise": [1]}, "fixed": {"noise": 1}}, "'noise' stands in fixed and in grid"),
-        ({"random": {"noise": [1]}}, "random.count must be a whole number of at least 1"),
         ({"random": {"count": 1, "noise": {"low": 1, "high": 1}}}, "low below high"),
-        ({"random": {"count": 1, "noise": 3}}, "random.noise must be a list of values"),
         ({"random": {"count": 1, "noise": {"low": 0, "high": 2, "log": True}}}, "low is above 0"),
         (
             {"trials": {"cuont": 5}},
             "unknown key 'trials.cuont' (did you mean 'count'?); available: count",
         ),
         ({"sedes": 5}, "unknown key 'sedes' (did you mean 'seeds'?); available: name, learners"),
-        ({"grid": 5}, "grid must be a table, got 5"),
     ],
 )
 def test_refused(entries, words):
@@ -258,7 +239,6 @@ class TestProblem:
                 "unknown key 'task.spread' (did you mean 'start_spread'?); available: ",
             ),
             ("tusk.spread", "unknown key 'tusk' (did you mean 'task'?); available: "),
-            ("task.horizon.x", "'horizon' of 'task.horizon.x' is no table"),
         ],
     )
     def test_unknown(self, path, words):
@@ -271,8 +251,6 @@ class TestProblem:
     ("entries", "words"),
     [
         ({"fixed": {"learning_rate": 1.0}}, "unknown field of a recipe or problem 'learning_rate'"),
-        ({"grid": {"ppo.noise": [1]}}, "unknown field of a recipe or problem 'ppo.noise'"),
-        ({"fixed": {"seed": 1}}, "unknown field of a recipe or problem 'seed'"),
         ({"grid": {"noise": [0.1, -1.0]}}, "noise must be greater than 0, got -1.0"),
         (
             {"grid": {"problem.task.start_spread": [0.2, 3.0]}},

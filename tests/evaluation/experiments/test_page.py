@@ -10,7 +10,6 @@ from small_studies import SMALL
 from kinarm.evaluation.experiments.page import (
     draw_all,
     effects,
-    learning_curves,
     write_all,
 )
 from kinarm.evaluation.experiments.study import Study
@@ -50,10 +49,6 @@ class TestTable:
         panels = {axes.get_title(): axes for axes in effects(study).axes}
         assert [text.get_text() for text in panels["sharing"].get_xticklabels()] == ["none", "pair"]
         assert set(panels) == {"learner", "sharing"}
-
-    def test_nothing_finished(self, small):
-        assert len(small().table()) == 0
-        assert small().groups() == ()
 
 
 class TestGroups:
@@ -106,29 +101,11 @@ class TestFiles:
             assert (folder / f"{name}.png").stat().st_size > 5000
             assert (folder / f"{name}.svg").stat().st_size > 5000
 
-    def test_the_same_study_gives_the_same_page(self, folder, finished):
-        before = (folder / "index.html").read_bytes()
-        write_all(finished, "kinarm-study <mine>.toml")
-        assert (folder / "index.html").read_bytes() == before
-
 
 class TestFigures:
     def test_nothing_varies(self, small):
         study = small(grid={}, seeds=1, trials={"count": 5, "per_decade": 0}).run(jobs=1)
         assert draw_all(study) == {}
-
-    def test_nothing_finished(self, small):
-        assert draw_all(small()) == {}
-
-    def test_curves_that_nothing_is_known_of_are_left_out(self, small):
-        """Here, the times of one seed."""
-        study = small(grid={}).run(jobs=1)
-        study.store.path("made", study.runs[0]).unlink()
-        steps, seconds = learning_curves(study).axes
-        (known,), (whole,) = seconds.lines[:-1], steps.lines[:-1]
-        trained = study.finished[study.runs[1]]
-        assert known.get_ydata()[-1] == trained.last.success
-        assert whole.get_ydata()[-1] == np.mean([run.last.success for run in study])
 
     def test_effects_are_means_over_the_rest(self, finished):
         (axes,) = effects(finished).axes

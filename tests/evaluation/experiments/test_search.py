@@ -109,9 +109,7 @@ class TestSearch:
     ("changes", "words"),
     [
         ({"search": {"count": 2}}, "search names no field"),
-        ({"grid": {"noise": [1]}}, "search and grid exclude each other"),
         ({"learners": ["ars", "ppo"]}, "a search has one learner and one recipe, got 2"),
-        ({"search": {"count": 2, "sampler": "gp", "noise": [1]}}, "search.sampler must be one of"),
         (
             {"search": {"count": 2, "problem.task.horizon": [1]}},
             "a search is for settings of a learner, not for 'problem.task.horizon'",

@@ -6,8 +6,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from kinarm.evaluation.experiments.experiment import Experiment
-from kinarm.evaluation.experiments.plan import plan
 from kinarm.evaluation.paper.results import LITERAL
 from kinarm.policies import recipe
 from kinarm.problem import PROBLEMS
@@ -67,10 +65,3 @@ def test_trainings_follow_their_reading(runs):
         assert config.problem.task == replace(expected, start_spread=reading.start_spread)
         rewarded = expected.reward if reading.reward == "progress" else sign
         assert config.training_problem.task.reward == rewarded
-
-
-def test_the_quick_reproduction_has_two_seeds_of_everything():
-    runs = plan(Experiment.load("reproduction_quick"))
-    found = Counter((run.entry.name.partition("-")[0], run.config.seed) for run in runs)
-    each = {"sweep": 9, "ars": 6, "ppo": 3}
-    assert found == {(purpose, seed): n for purpose, n in each.items() for seed in (0, 1)}

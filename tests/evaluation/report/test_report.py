@@ -145,24 +145,6 @@ class TestWorst:
 
 
 class TestPage:
-    def test_how_it_was_made_is_told(self, page, document):
-        told = text_of(content(page).find(".//section[@id='method']"))
-        protocol = document.to_json()["protocol"]
-        assert protocol["command"] in told
-        assert protocol["problems"]["right"]["digest"] in told
-        for entry in protocol["problems"].values():
-            assert entry["trial_set_hash"] in told
-        for package, version in protocol["versions"].items():
-            assert f"{package} {version}" in told
-        for words in (
-            protocol["commit"],
-            "mid-P",
-            "Student",
-            "percentile bootstrap",
-            "1000 resamples",
-        ):
-            assert words in told
-
     def test_nothing_points_outside(self, page):
         assert "default-src 'none'" in page
         own = page[: page.index("<iframe")] if "<iframe" in page else page
@@ -184,19 +166,3 @@ class TestPage:
         twice = [skilled_evaluation, skilled_evaluation]
         with pytest.raises(InvalidInputError, match="two policies are called 'skilled'"):
             report_page(evaluation_document(twice, ""), twice)
-
-    def test_policies_are_counted_as_the_reader_counts_them(self, page, document):
-        """Rows of the tables with a name of their own; the rest is named beside the number."""
-        names, others = set(), set()
-        for task in document.protocol.problems:
-            rows = rows_of(page, task)
-            policies = {text_of(row.find("th")) for row in rows if row.get("class") == "policy"}
-            heading = text_of(content(page).find(f".//section[@id='{task}']/h2"))
-            plural = "policy" if len(policies) == 1 else "policies"
-            assert heading == f"Problem {task} {len(policies)} {plural}"
-            names |= policies
-            others |= {text_of(row.find("th")) for row in rows} - policies
-        assert f"<h1>{len(names)} policies</h1>" in page
-        subtitle = re.search(r'class="subtitle">(.*?)<', page)[1].split(" · ")
-        assert subtitle[:2] == ["1 to 3 training seeds each", "beside zero and the oracle"]
-        assert others == {"zero", "oracle"}

@@ -8,17 +8,10 @@ import numpy as np
 import pytest
 from drawings import PIXEL
 
-from kinarm.evaluation.evaluation import evaluate
 from kinarm.evaluation.report import charts
 from kinarm.evaluation.report.charts import level
-from kinarm.evaluation.report.groups import group_results
-from kinarm.evaluation.report.page import report_page
 from kinarm.evaluation.report.templating import template_environment
 from kinarm.evaluation.statistics import share_over_seeds
-from kinarm.evaluation.summary import evaluation_document
-from kinarm.problem import ReachProblem
-from kinarm.scene import GoalRegion, Obstacle, Scene
-from kinarm.task import ReachTask
 
 
 def drawn(page: str, path: str) -> ElementTree.Element:
@@ -88,12 +81,6 @@ class TestProfile:
 
 
 class TestHistogram:
-    def test_bars_show_every_trial(self, page, right):
-        for group in right.groups:
-            bars = shapes(page, group.name, "bars")
-            shares = [float(bar.findtext("title").split(": ")[1].split()[0]) for bar in bars]
-            assert sum(shares) == pytest.approx(100, abs=0.005 * len(shares))
-
     def test_bars_are_as_high_as_the_root_of_their_share(self, page, right):
         row = max(48, 270 // len(right.groups))
         for group in right.groups:
@@ -150,22 +137,6 @@ class TestMap:
         assert float(rect.get("x")) > float(base.get("cx"))
         assert float(base.get("cx")) == pytest.approx(view.y[1] * charts.SCALE)
         assert float(base.get("cy")) == pytest.approx(view.x[1] * charts.SCALE)
-
-    def test_a_world_of_ones_own(self):
-        """A region in front of the arm, and a post before it."""
-        region = GoalRegion(name="front", lower=(0.4, -0.3, 0.2), upper=(0.7, 0.3, 0.5))
-        post = Obstacle(name="post", lower=(0.3, -0.4, 0), upper=(0.36, -0.34, 0.8))
-        far = Obstacle(name="far", lower=(5, 5, 0), upper=(6, 6, 1))
-        scene = Scene(obstacles=(post, far), goal_regions=(region,))
-        task = ReachTask(goal_regions=("front",))
-        made = evaluate("zero", ReachProblem(name="own", scene=scene, task=task), trials=20)
-        document = evaluation_document([made], "")
-        (results,) = group_results(document, [made])
-        (group,) = results.groups
-        rects = drawn_map(report_page(document, [made])).findall("rect")
-        assert [rect.find("title").text for rect in rects] == ["obstacle: post", "region: front"]
-        shares = [share for _, share in charts.failure_shares(group, region) if share is not None]
-        assert shares == [1.0] * len(shares)
 
     def test_failures_are_counted_where_they_happen(self, right):
         group, (region,) = right.contenders[0], right.goal_regions

@@ -133,13 +133,6 @@ def test_after_a_refused_move_contact_is_still_found():
     assert compared > 500
 
 
-def test_horizon_truncates_whatever_touches():
-    env = ReachGoalEnv(horizon=20)
-    env.reset(options=DOWN)
-    flags = [env.step([0, 1, 0, 0, 0])[2:4] for _ in range(20)]
-    assert flags == [(False, False)] * 19 + [(False, True)]
-
-
 def test_batch_equals_single_environments():
     batch = gymnasium.make_vec("kinarm/ReachGoalBoth-v0", num_envs=5, tolerance=0.3)
     loop = gymnasium.make_vec(

@@ -119,20 +119,6 @@ class TestEpisode:
         assert not truncated
         assert not info["success"]
 
-    def test_success_ends(self, env):
-        goal = env.simulator.arm.tool_position([math.radians(7), 0, 0, 0, 0, 0])
-        env.reset(options={"start": HOME, "goal": goal})
-        _, _, terminated, truncated, info = env.step([1, 0, 0, 0, 0])
-        assert terminated
-        assert not truncated
-        assert info["success"]
-        assert info["distance"] == pytest.approx(0, abs=1e-12)
-
-    def test_horizon_truncates(self, env):
-        env.reset(options={"start": HOME, "goal": [0, 5, 5]})
-        flags = [env.step(np.zeros(5))[2:4] for _ in range(64)]
-        assert flags == [(False, False)] * 63 + [(False, True)]
-
     def test_nothing_moves_after_the_end(self, env):
         """As Gymnasium's CartPole: a warning, the same flags, no reward."""
         goal = env.simulator.arm.tool_position([math.radians(7), 0, 0, 0, 0, 0])
@@ -144,13 +130,6 @@ class TestEpisode:
         assert again[1:4] == (0.0, True, False)
         assert again[4]["is_success"]
         assert again[4]["distance"] == over[4]["distance"]
-
-    def test_larger_actions_are_clipped(self, env):
-        options = {"start": HOME, "goal": [0, 5, 5]}
-        env.reset(options=options)
-        expected = env.step([1, -1, 0, 0, 0])[0]
-        env.reset(options=options)
-        np.testing.assert_array_equal(env.step([9, -9, 0, 0, 0])[0], expected)
 
 
 class TestSeeding:

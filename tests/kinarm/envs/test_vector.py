@@ -86,11 +86,6 @@ class TestAutoreset:
         assert successes > 2
 
 
-def test_default_autoreset_is_that_of_gymnasium():
-    ours, theirs = ReachVectorEnv(), SyncVectorEnv([ReachEnv])
-    assert ours.metadata["autoreset_mode"] == theirs.metadata["autoreset_mode"]
-
-
 def test_contacts_are_those_that_coal_finds():
     batch = native("NextStep", 64)
     batch.reset(seed=0)
@@ -148,12 +143,6 @@ class TestSeeding:
         for i in range(NUMBER):
             np.testing.assert_array_equal(observations[i], ReachEnv("both").reset(seed=11 + i)[0])
 
-    def test_list_of_seeds(self):
-        seeds = [5, 5, 1, 0, 2, 9, 5]
-        observations, _ = native("SameStep").reset(seed=seeds)
-        np.testing.assert_array_equal(observations[0], observations[1])
-        np.testing.assert_array_equal(observations[2], ReachEnv("both").reset(seed=1)[0])
-
     def test_batch_size_does_not_matter(self):
         small, large = native("SameStep", 3), native("SameStep", 200)
         observations = small.reset(seed=0)[0], large.reset(seed=0)[0][:3]
@@ -209,22 +198,12 @@ class TestOptions:
         [
             ({"start": np.zeros((3, 6))}, "start must have a row for each of 7 arms, got 3"),
             ({"goal": np.zeros((NUMBER, 2))}, r"goal must have shape \(n, 3\), got \(7, 2\)"),
-            ({"start": np.zeros(5)}, r"start must have shape \(6\), got \(5,\)"),
             ({"start": np.eye(NUMBER, 6) * 9}, r"start\[0\] lies outside the limits: "),
-            ({"goals": np.zeros(3)}, "unknown reset option 'goals' .did you mean 'goal'"),
         ],
     )
     def test_bad_options(self, options, message):
         with pytest.raises(InvalidInputError, match=message):
             native("SameStep").reset(options=options)
-
-    def test_rounding_beyond_limits_is_clipped(self):
-        batch = native("SameStep")
-        upper = batch.simulator.arm.upper
-        starts = np.zeros((NUMBER, 6))
-        starts[2, 0] = upper[0] + 5e-7
-        batch.reset(seed=0, options={"start": starts})
-        assert batch.configuration[2, 0] == upper[0]
 
     def test_the_arm_whose_start_is_in_contact_is_named(self):
         starts = np.zeros((NUMBER, 6))
@@ -250,7 +229,6 @@ class TestOptions:
     ("settings", "message"),
     [
         ({"num_envs": 0}, "num_envs must be a whole number of at least 1"),
-        ({"autoreset_mode": "Later"}, "autoreset_mode must be one of.*NextStep.*'Later'"),
         ({"horizons": 3}, "unexpected keyword argument 'horizons'; available"),
     ],
 )
@@ -310,9 +288,3 @@ def test_vector_environments_of_single_ones(kind):
         actions = np.full((2, 5), 0.02)
         assert_same_results(envs.step(actions), batch.step(actions))
     envs.close()
-
-
-def test_before_the_first_reset_there_is_nothing_to_mask():
-    batch = ReachVectorEnv(2)
-    with pytest.raises(InvalidInputError, match=r"call reset\(\) without it first"):
-        batch.reset(options={"reset_mask": np.array([True, False])})

@@ -62,12 +62,9 @@ def test_unknown_environment(env_id):
     ("settings", "message"),
     [
         ({"seed": -1}, "seed must be a whole number of at least 0"),
-        ({"render_mode": "ansi"}, "render_mode must be one of"),
-        ({"observation_dtype": "int8"}, "observation_dtype must be one of"),
         ({"reward_type": "rare"}, "reward_type must be one of"),
         ({"speed": 2}, "speed"),
         ({"replay_share": 1.5}, r"share must lie in \[0, 1\], got 1.5"),
-        ({"replay_size": 0}, "size must be a whole number of at least 1"),
         ({"problem": "up"}, "unknown problem 'up'"),
     ],
 )

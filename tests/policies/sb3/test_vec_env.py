@@ -108,12 +108,6 @@ class TestSeeds:
         for other in (env, sb3_vec_env("both", 3)):
             assert_same(np.array(first), np.array(run(other)))
 
-    def test_seed_of_the_maker_is_that_of_the_first_reset(self):
-        env, other = sb3_vec_env("both", 3, seed=4), sb3_vec_env("both", 3)
-        other.seed(4)
-        assert_same(env.reset(), other.reset())
-        assert_same(env.reset(), other.reset())
-
 
 class TestOptions:
     def test_starts_and_goals_can_be_set_once(self):
@@ -183,18 +177,6 @@ class TestAttributes:
             env.set_attr("note", "others", indices=[1])
         assert env.get_attr("note") == ["yours"] * 3
 
-    def test_rewards_are_computed_as_by_the_single_environment(self):
-        env, single = sb3_vec_env(GOALS, 4), gymnasium.make(GOALS).unwrapped
-        rng = np.random.default_rng(0)
-        achieved = rng.uniform(-1, 1, (50, 3))
-        desired = achieved + rng.uniform(-0.05, 0.05, (50, 3))
-        pairs = list(zip(achieved, desired, strict=True))
-        for method in ("compute_reward", "compute_terminated", "compute_truncated"):
-            (found,) = env.env_method(method, achieved, desired, [{}] * 50, indices=[0])
-            wanted = [getattr(single, method)(*pair, {}) for pair in pairs]
-            np.testing.assert_array_equal(found, wanted)
-        assert len(env.env_method("compute_reward", achieved, desired, {})) == 4
-
     def test_infos_are_as_if_monitored(self):
         env = sb3_vec_env(FLAT, 2)
         assert env.env_is_wrapped(Monitor) == [True, True]
@@ -234,16 +216,6 @@ class TestReplay:
             if not info["is_success"]:
                 failed.add(goal)
         assert 0.3 < np.mean(replays) < 0.6
-
-    def test_same_seed_same_run(self):
-        first, second = (
-            self.play(sb3_vec_env(FLAT, 10, seed=4, replay_share=0.5), 80) for _ in range(2)
-        )
-        assert [goal for goal, _ in first] == [goal for goal, _ in second]
-        env = sb3_vec_env(FLAT, 10, seed=4, replay_share=0.5)
-        self.play(env, 80)
-        env.seed(4)
-        assert [goal for goal, _ in self.play(env, 80)] == [goal for goal, _ in first]
 
     def test_what_failed_goes_on_elsewhere(self, tmp_path):
         """Saved by NumPy, given back through a wrapper, before or after a learner's seed."""
