@@ -15,6 +15,7 @@ COMMANDS = {
     "train": ("kinarm.evaluation.commands.train", "train a policy"),
     "eval": ("kinarm.evaluation.commands.evaluate", "evaluate policies beside the oracle"),
     "replay": ("kinarm.evaluation.commands.replay", "watch what policies do, in a browser"),
+    "export": ("kinarm.evaluation.commands.export", "run a policy on an arm, without kinarm"),
     "study": ("kinarm.evaluation.commands.study", "compare learners and their settings"),
     "problem": ("kinarm.evaluation.commands.problem", "look at problems, and check your own"),
     "arms": ("kinarm.evaluation.commands.arms", "look at arms, and check your own"),

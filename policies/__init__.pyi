@@ -4,6 +4,7 @@ from .checkpoint import Checkpoint as Checkpoint
 from .checkpoint import load_checkpoint as load_checkpoint
 from .checkpoint import save_checkpoint as save_checkpoint
 from .config import TrainingConfig as TrainingConfig
+from .export import export_policy as export_policy
 from .learners import CurvePoint as CurvePoint
 from .learners import Learner as Learner
 from .learners import TrainingResult as TrainingResult

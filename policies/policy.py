@@ -236,6 +236,12 @@ class Policy:
         pieces, own = module_pieces(module), ReachProblem.load(problem)
         return policy_of_pieces(cls, pieces, own, mean, std, recipe="torch", **origin)
 
+    def to_torch(self) -> Any:
+        """Make a module of PyTorch that maps observations to actions, in double precision."""
+        from kinarm.policies.conversion.to_torch import network_module
+
+        return network_module(self)
+
     def check_arm(self, arm: Arm) -> None:
         """Refuse an arm that the simulator treats otherwise than its own."""
         trained = self.problem.arm
@@ -327,10 +333,8 @@ def flat_observation(
     (..., goal_width) [m]. The flat one has the shape (..., n_observations), of the layout.
     """
     if set(given) != set(GOAL_KEYS):
-        raise InvalidInputError(
-            f"a dictionary observation has the keys {', '.join(GOAL_KEYS)}, got "
-            f"{', '.join(map(str, given))}"
-        )
+        wanted, found = (", ".join(map(str, keys)) for keys in (GOAL_KEYS, given))
+        raise InvalidInputError(f"a dictionary observation has the keys {wanted}, got {found}")
     if layout.history > 1:
         raise InvalidInputError("a policy with a history needs a flat observation")
     (goals, offsets), entries = layout.goal_entries, layout.entries(of_goal=False)

@@ -89,6 +89,11 @@ def test_examples_of_evaluating_and_replaying(run, place):
     check(run, examples_of(run, "kinarm-replay"), least=7)
 
 
+def test_examples_of_exporting(run, place):
+    pytest.importorskip("onnx")
+    check(run, examples_of(run, "kinarm-export"), least=2)
+
+
 def test_examples_of_problems(run, place):
     check(run, examples_of(run, "kinarm-problem"), least=1)
 

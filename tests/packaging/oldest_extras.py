@@ -16,7 +16,19 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
 
-EXTRAS = ("minari", "peers", "ray", "render", "robots", "sb3", "slurm", "study", "tune", "zoo")
+EXTRAS = (
+    "export",
+    "minari",
+    "peers",
+    "ray",
+    "render",
+    "robots",
+    "sb3",
+    "slurm",
+    "study",
+    "tune",
+    "zoo",
+)
 
 
 def oldest(extra: str) -> Iterator[str]:

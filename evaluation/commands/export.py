@@ -1,0 +1,42 @@
+"""``kinarm-export``: a policy as a folder that runs on an arm, without kinarm."""
+
+from dataclasses import dataclass, field
+from functools import partial
+from pathlib import Path
+
+from kinarm._command_line import run_request
+from kinarm._fields import Checked
+
+
+@dataclass(frozen=True, kw_only=True)
+class ExportRequest(Checked):
+    """Write a folder that runs a policy on an arm, with NumPy alone.
+
+    Parameters
+    ----------
+    policy : str
+        The policy: its name, a file, or a model of Stable-Baselines3 (.zip).
+    out : Path
+        The folder to write.
+    onnx : bool
+        Write it in ONNX as well, which needs the extra export.
+    overwrite : bool
+        Replace the files of an earlier folder.
+    """
+
+    policy: str = field(metadata={"flag": "policy", "metavar": "POLICY"})
+    out: Path = field(metadata={"metavar": "DIR"})
+    onnx: bool = True
+    overwrite: bool = False
+
+
+def _export(request: ExportRequest, _: str) -> None:
+    from kinarm.policies import Policy, export_policy, load_policy
+
+    load = Policy.from_sb3 if request.policy.endswith(".zip") else load_policy
+    export_policy(load(request.policy), request.out, overwrite=request.overwrite, onnx=request.onnx)
+    print(f"written: {request.out}; python {request.out}/arm_policy.py tests it")
+
+
+main = partial(run_request, "kinarm-export", ExportRequest, _export)
+"""Run the command line."""
