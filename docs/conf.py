@@ -66,7 +66,7 @@ nitpick_ignore_regex = [
     (r"py:obj", r"kinarm\.(policies|evaluation|state|kernels\.\w+)"),
     (r"py:obj", r"kinarm\.evaluation\.problem_check\.\w+"),
     # What only kernels look into.
-    (r"py:class", r"kinarm\.(kernels\.session\.Session|episodes\.Rules|task\.Goals)"),
+    (r"py:class", r"kinarm\.(kernels\.session\.Session|episodes\.Rules|goals\.Goals)"),
     (r"py:class", r"kinarm\.collision\.Step"),
 ]
 

@@ -17,7 +17,7 @@ import numpy as np
 
 from kinarm import PROBLEMS, REWARD_TERMS, Arm, Plant, RewardWeights, Scene, Simulator, plant_names
 from kinarm.__main__ import COMMANDS
-from kinarm._fields import summary_of, to_plain
+from kinarm._fields import init_fields, summary_of, to_plain
 from kinarm.contact_pairs import link_of
 from kinarm.enclosures import inner_capsule
 from kinarm.envs import ENVIRONMENTS
@@ -25,6 +25,7 @@ from kinarm.evaluation import METRICS
 from kinarm.evaluation.commands import arms, problem
 from kinarm.evaluation.outcomes import HOLDING_STEPS
 from kinarm.evaluation.report.templating import markdown_table
+from kinarm.goals import GoalSpecification
 from kinarm.observation import ACTUATED, JOINTS, OBSERVATION, ONCE, SLOTS, Part
 from kinarm.observation_layout import ObservationLayout
 from kinarm.policies import find_learner
@@ -134,6 +135,16 @@ def reward_table() -> str:
         for name in REWARD_TERMS
     ]
     return markdown_table(["term", "weight by default", "what the weight is"], rows)
+
+
+def goals_table() -> str:
+    """What goals may be, and how they are reached."""
+    default, rows = GoalSpecification(), []
+    for name in init_fields(GoalSpecification):
+        value = to_plain(getattr(default, name))
+        meaning = summary_of(GoalSpecification, name).replace("``", "`")
+        rows.append([f"`{name}`", "" if value in (None, []) else f"`{value}`", meaning])
+    return markdown_table(["field of `[task.goal]`", "default", "meaning"], rows)
 
 
 def observation_table() -> str:
@@ -268,6 +279,7 @@ TABLES = {
     "problems": problems_table,
     "programs": programs_table,
     "reward": reward_table,
+    "goals": goals_table,
     "observation": observation_table,
     "observation-parts": all_parts_table,
     "metrics": metrics_table,

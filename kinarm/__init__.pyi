@@ -28,6 +28,7 @@ from .errors import StartInContactError as StartInContactError
 from .errors import TrainingFailedError as TrainingFailedError
 from .errors import UnknownNameError as UnknownNameError
 from .errors import WorkerError as WorkerError
+from .goals import GoalSpecification as GoalSpecification
 from .inverse_kinematics import InverseSolutions as InverseSolutions
 from .networks import CompiledPolicy as CompiledPolicy
 from .networks import Layer as Layer
