@@ -39,6 +39,8 @@ SYMBOLS = {
     "dᵢ": "final distance of trial i [m]",
     "kᵢ": "steps that trial i took",
     "bᵢ": "bound of trial i: steps that the oracle proves to be necessary",
+    "gᵢ": "goals that trial i reached",
+    "rᵢ": "error of the goal's direction, rotation or joints at the end of trial i [rad]",
     "aᵢ": "closest approach of trial i, if success does not end it [m]",
     "eᵢ": f"largest distance after the last {HOLDING_STEPS} steps of that longer trial [m]",
     "H": "set of these longer trials that touch something",
