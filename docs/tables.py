@@ -26,8 +26,9 @@ from kinarm.evaluation.commands import arms, problem
 from kinarm.evaluation.outcomes import HOLDING_STEPS
 from kinarm.evaluation.report.templating import markdown_table
 from kinarm.goals import GoalSpecification
-from kinarm.observation import ACTUATED, JOINTS, OBSERVATION, ONCE, SLOTS, Part
+from kinarm.observation import OBSERVATION
 from kinarm.observation_layout import ObservationLayout
+from kinarm.observation_part import ACTUATED, JOINTS, ONCE, SLOTS, Part
 from kinarm.policies import find_learner
 
 DOCS = Path(__file__).parent

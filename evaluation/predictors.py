@@ -12,12 +12,13 @@ from numpy.typing import ArrayLike, NDArray
 
 from kinarm._parallel import one_torch_thread
 from kinarm.envs import ReachEnv
-from kinarm.episodes import RUNNING, Episodes, Rollouts, StepResult
+from kinarm.episodes import RUNNING, Episodes, Rollouts
 from kinarm.evaluation.trials import TrialSet
 from kinarm.kernels.compiling import Array
 from kinarm.networks import takes_rows
 from kinarm.policies.policy import Policy
 from kinarm.simulator import Simulator
+from kinarm.step_result import StepResult
 
 Wrapper = Callable[[Any], Any]
 """Wraps an environment: one of Gymnasium, or ``venv``, a ``VecEnv`` of Stable-Baselines3."""

@@ -15,7 +15,6 @@ from .envs import ReachGoalEnv as ReachGoalEnv
 from .envs import ReachGoalVectorEnv as ReachGoalVectorEnv
 from .envs import ReachVectorEnv as ReachVectorEnv
 from .episodes import Rollouts as Rollouts
-from .episodes import StepResult as StepResult
 from .errors import ArmError as ArmError
 from .errors import InvalidInputError as InvalidInputError
 from .errors import KinarmError as KinarmError
@@ -51,6 +50,7 @@ from .scene import Mount as Mount
 from .scene import Obstacle as Obstacle
 from .scene import Scene as Scene
 from .simulator import Simulator as Simulator
+from .step_result import StepResult as StepResult
 from .task import REWARD_TERMS as REWARD_TERMS
 from .task import ReachTask as ReachTask
 from .task import RewardWeights as RewardWeights

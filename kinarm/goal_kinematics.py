@@ -2,6 +2,7 @@
 
 import math
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 import pinocchio as pin
@@ -10,7 +11,8 @@ from numpy.typing import ArrayLike, NDArray
 from kinarm.bodies import rotation_matrix, rotation_of_quaternion
 from kinarm.chain import within_limits
 from kinarm.collision import ContactModel
-from kinarm.errors import ProblemError, finite_array
+from kinarm.episodes import Pursuit
+from kinarm.errors import LARGEST, InvalidInputError, ProblemError, finite_array
 from kinarm.goals import Cone, Goals, quaternion_between, unit
 from kinarm.inverse_kinematics import InverseKinematics, approach_axis
 from kinarm.kernels.compiling import Array
@@ -24,6 +26,18 @@ SOLUTIONS = (4, 64)
 
 SAMPLE = 64
 """Goals that show whether an arm reaches any."""
+
+
+NO_PURSUIT = recorded(
+    Pursuit(
+        *(np.zeros((0, 0)), np.zeros(0), np.zeros(0, np.int64), np.zeros(0, np.int64)),
+        *(np.zeros((0, 0, 3)), np.zeros((0, 0, 3))),
+    )
+)
+"""For standing points that are reached once touched."""
+
+UNIT_LENGTH = 1e-6
+"""How far the square of a direction's or quaternion's length may be from 1."""
 
 
 class GoalKinematics(InverseKinematics):
@@ -185,3 +199,36 @@ class GoalKinematics(InverseKinematics):
     def screened(self, q: Array, scenes: Array | None = None) -> tuple[Array, NDArray[np.bool_]]:
         """Tool points of configurations, and which touch something, as `kinarm.World` tells."""
         raise NotImplementedError
+
+    def check_scenarios(self, starts: ArrayLike, goals: ArrayLike) -> tuple[Array, Array]:
+        """Copy starts and goals, or refuse them."""
+        q = finite_array("starts", starts, (None, self.arm.n_joints))
+        goal = finite_array("goals", goals, (len(q), self.goal_width))
+        if (farthest := np.abs(goal).max(initial=0.0)) > LARGEST:
+            raise InvalidInputError(f"goals must lie within {LARGEST:g} m, got {farthest:g}")
+        if self.problem.task.goal.kind in ("direction", "pose") and len(goal):
+            off = np.abs(np.square(goal[:, 3:]).sum(axis=1) - 1.0)
+            if off.max() > UNIT_LENGTH:
+                raise InvalidInputError(
+                    f"directions and quaternions of goals must have length 1, but goal "
+                    f"{off.argmax()} has {goal[off.argmax(), 3:].tolist()}"
+                )
+        return within_limits("starts", q, self.arm.chain, self.arm.joint_names), goal
+
+    def pursuit(self, goals: Array, *, record: bool) -> Any:
+        """Record of what episodes have besides, with only their first goals."""
+        spec, horizon, (n, width) = self.problem.task.goal, self.problem.task.horizon, goals.shape
+        if spec.plain:
+            return NO_PURSUIT
+        count = spec.count(horizon)
+        kept = (n, horizon + 1, width) if record and count else (0, 0, width)
+        return recorded(
+            Pursuit(
+                reached=np.zeros((n, width)),
+                turn=np.zeros(n),
+                held=np.zeros(n, dtype=np.int64),
+                goals_reached=np.zeros(n, dtype=np.int64),
+                goals=np.repeat(goals[:, None], count, axis=1)[: n if count else 0],
+                path=np.full(kept, np.nan),
+            )
+        )

@@ -4,8 +4,8 @@ A new part is a function that writes it and an entry of `OBSERVATION`; all else 
 chooses some (`kinarm.Observation`). Policies of another layout are refused.
 """
 
-from collections.abc import Callable, Iterator, Sequence
-from typing import TYPE_CHECKING, Any, NamedTuple
+from collections.abc import Iterator, Sequence
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -17,6 +17,7 @@ from kinarm.kernels.goals import nearer_sign, write_reached
 from kinarm.kernels.plant import COMMAND
 from kinarm.kernels.session import Session
 from kinarm.kernels.surroundings import NEAR, Seen, write_obstacles, write_proximity
+from kinarm.observation_part import ACTUATED, JOINTS, ONCE, SLOTS, Part, Ranges
 from kinarm.scene import Scene
 
 if TYPE_CHECKING:
@@ -24,57 +25,6 @@ if TYPE_CHECKING:
 
 VERSION = 1
 """To be raised when a part's meaning changes, but not its name and length."""
-
-ONCE, JOINTS, ACTUATED, SLOTS = "", "n", "a", "k"
-"""What has a part: the arm, each joint, each actuated joint, or each slot for a body."""
-
-
-class Ranges(NamedTuple):
-    """Ranges of the entries of an observation in a problem.
-
-    A box of all goals with tolerance, a bound on the distance from the world's origin to any point
-    of the arm [m], the joints' limits [rad or m], and the actuated ones' largest velocities, as
-    fractions of theirs; joints and velocities as they are measured.
-    """
-
-    goal_lower: Array
-    goal_upper: Array
-    reach: float
-    lower: Array
-    upper: Array
-    fastest: Array
-
-
-class Part(NamedTuple):
-    """A part of the observation.
-
-    Attributes
-    ----------
-    name, meaning, unit : str
-        Its name in layouts, and its meaning for people.
-    signs : tuple of int
-        Signs of its entries in the reflection y -> -y; 0 for that of the joint.
-    bounds : callable
-        From `Ranges` to lowest and highest values of its entries.
-    write : callable
-        Formula; see `write_goal`.
-    of : str
-        What has one: `ONCE`, `JOINTS`, `ACTUATED` or `SLOTS`.
-    of_goal : bool
-        Whether it depends on the goal.
-    lacks : callable
-        From arm and scene to why they cannot have it, or an empty text.
-    """
-
-    name: str
-    meaning: str
-    unit: str
-    signs: tuple[int, ...]
-    bounds: Callable[[Ranges], tuple[Array | float, Array | float]]
-    write: Callable[[Session, Seen, int, int], None]
-    of: str = ONCE
-    of_goal: bool = False
-    lacks: Callable[["Arm", Scene], str] = lambda *_: ""
 
 
 @inlined

@@ -10,7 +10,8 @@ from kinarm.arm import Arm
 from kinarm.errors import InvalidInputError, ProblemError
 from kinarm.goals import REST_PARTS
 from kinarm.kernels.compiling import Array
-from kinarm.observation import ACTUATED, JOINTS, OBSERVATION, ONCE, SLOTS, VERSION, Part, Ranges
+from kinarm.observation import OBSERVATION, VERSION
+from kinarm.observation_part import ACTUATED, JOINTS, ONCE, SLOTS, Part, Ranges
 from kinarm.problem import ReachProblem
 
 

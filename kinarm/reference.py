@@ -18,7 +18,7 @@ from kinarm.errors import LARGEST
 from kinarm.goals import GOAL_RESTS, REST_ERRORS
 from kinarm.inverse_kinematics import approach_axis
 from kinarm.kernels.compiling import Array
-from kinarm.observation import SLOTS
+from kinarm.observation_part import SLOTS
 from kinarm.reference_plant import ReferencePlant
 from kinarm.scenarios import draw_followers
 from kinarm.simulator import Simulator

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from kinarm._parallel import one_torch_thread, run_together
 from kinarm.arm import Arm
-from kinarm.episodes import PAUSED, RUNNING, Control, Episodes, Rollouts, StepResult
+from kinarm.episodes import PAUSED, RUNNING, Control, Episodes, Rollouts
 from kinarm.errors import InvalidInputError, StartInContactError, finite_array
 from kinarm.kernels.compiling import Array
 from kinarm.kernels.rollout import advance, allow_one_step, begin, refuse, results_of_step
@@ -21,6 +21,7 @@ from kinarm.plant import PlantLike
 from kinarm.problem import ProblemLike, ReachProblem
 from kinarm.scenarios import draw_followers, draw_scenarios
 from kinarm.scene import Scene
+from kinarm.step_result import StepResult
 from kinarm.task import ReachTask
 from kinarm.world import World
 

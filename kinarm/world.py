@@ -10,16 +10,14 @@ from numpy.typing import ArrayLike, NDArray
 
 from kinarm._parallel import available_threads, run_rows
 from kinarm.bodies import PARKED
-from kinarm.chain import Chain, within_limits
+from kinarm.chain import Chain
 from kinarm.clearance import Clearance, flattened, measure_clearance
 from kinarm.collision import ContactModel
 from kinarm.contact_shapes import PLANE, ContactShapes, unit_boxes
 from kinarm.episode_plants import EpisodePlants
 from kinarm.episode_scenes import drawn_rows
-from kinarm.episodes import Control, Episodes, Pursuit, Rules
+from kinarm.episodes import Control, Episodes, Rules
 from kinarm.errors import (
-    LARGEST,
-    InvalidInputError,
     finite_array,
     one_or_many,
     whole_number,
@@ -37,17 +35,6 @@ from kinarm.problem import ProblemLike, ReachProblem
 from kinarm.scene_draws import SceneDraws
 from kinarm.shield import shield_table
 from kinarm.step_contact import StepContact
-
-NO_PURSUIT = recorded(
-    Pursuit(
-        *(np.zeros((0, 0)), np.zeros(0), np.zeros(0, np.int64), np.zeros(0, np.int64)),
-        *(np.zeros((0, 0, 3)), np.zeros((0, 0, 3))),
-    )
-)
-"""For standing points that are reached once touched."""
-
-UNIT_LENGTH = 1e-6
-"""How far the square of a direction's or quaternion's length may be from 1."""
 
 
 class World(GoalKinematics, StepContact):
@@ -256,21 +243,6 @@ class World(GoalKinematics, StepContact):
         other.contact_model = replace(model, shapes=model.shapes._replace(moving=none))
         return other
 
-    def check_scenarios(self, starts: ArrayLike, goals: ArrayLike) -> tuple[Array, Array]:
-        """Copy starts and goals, or refuse them."""
-        q = finite_array("starts", starts, (None, self.arm.n_joints))
-        goal = finite_array("goals", goals, (len(q), self.goal_width))
-        if (farthest := np.abs(goal).max(initial=0.0)) > LARGEST:
-            raise InvalidInputError(f"goals must lie within {LARGEST:g} m, got {farthest:g}")
-        if self.problem.task.goal.kind in ("direction", "pose") and len(goal):
-            off = np.abs(np.square(goal[:, 3:]).sum(axis=1) - 1.0)
-            if off.max() > UNIT_LENGTH:
-                raise InvalidInputError(
-                    f"directions and quaternions of goals must have length 1, but goal "
-                    f"{off.argmax()} has {goal[off.argmax(), 3:].tolist()}"
-                )
-        return within_limits("starts", q, self.arm.chain, self.arm.joint_names), goal
-
     def clearance(self, configurations: ArrayLike) -> Clearance:
         """Measure how far the closest of the tested pairs is apart, and where.
 
@@ -315,7 +287,6 @@ class World(GoalKinematics, StepContact):
         """
         n, n_joints = starts.shape
         horizon, n_observations = self.rules.horizon, self.n_observations
-        goal = self.problem.task.goal
         shapes = self.contact_model.shapes
         own_scenes = self.has_random_bodies or len(shapes.moving) > 0
         plants = np.zeros((n if self.plants.width else 0, self.plants.width))
@@ -334,7 +305,7 @@ class World(GoalKinematics, StepContact):
             drive=self.plants.at_rest(plants, starts[: len(plants)]),
             sensed=starts.copy() if self.plants.width else starts[:0],
             goal=goals.copy(),
-            pursuit=NO_PURSUIT if goal.plain else self._pursuit(goals, record=record),
+            pursuit=self.pursuit(goals, record=record),
             observation=np.zeros((n, n_observations)),
             distance=np.zeros(n),
             terms=np.zeros((n, len(self.rules.reward))),
@@ -348,22 +319,6 @@ class World(GoalKinematics, StepContact):
             interventions=np.zeros(n, dtype=np.int64),
             replaced=np.zeros((n if record else 0, horizon), dtype=np.int64),
             path=np.full((n, horizon + 1, n_joints) if record else (0, 0, n_joints), np.nan),
-        )
-
-    def _pursuit(self, goals: Array, *, record: bool) -> Any:
-        """Record of what episodes have besides, with only their first goals."""
-        n, width = goals.shape
-        count, horizon = self.problem.task.goal.count(self.rules.horizon), self.rules.horizon
-        kept = (n, horizon + 1, width) if record and count else (0, 0, width)
-        return recorded(
-            Pursuit(
-                reached=np.zeros((n, width)),
-                turn=np.zeros(n),
-                held=np.zeros(n, dtype=np.int64),
-                goals_reached=np.zeros(n, dtype=np.int64),
-                goals=np.repeat(goals[:, None], count, axis=1)[: n if count else 0],
-                path=np.full(kept, np.nan),
-            )
         )
 
     def session(self, control: Control, episodes: Episodes) -> Session:

@@ -16,13 +16,15 @@ from numpy.typing import DTypeLike, NDArray
 from kinarm.chain import within_limits
 from kinarm.envs.extra import ExtraObservation
 from kinarm.envs.rendering import RENDER_MODES, EnvPictures
-from kinarm.episodes import Episodes, StepResult
+from kinarm.episodes import Episodes
 from kinarm.errors import InvalidInputError, UnknownNameError, one_or_many
-from kinarm.observation import UNIT, Ranges
+from kinarm.observation import UNIT
+from kinarm.observation_part import Ranges
 from kinarm.plant import MOST_NOISE, RANGES
 from kinarm.problem import ProblemLike, ReachProblem
 from kinarm.scenarios import ScenarioQueues
 from kinarm.simulator import Simulator
+from kinarm.step_result import StepResult
 
 Array = NDArray[np.float64]
 Observations = Any

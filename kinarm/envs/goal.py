@@ -18,11 +18,12 @@ from kinarm.envs.environment import (
 )
 from kinarm.envs.reach import ReachEnv
 from kinarm.envs.vector import ReachVectorEnv
-from kinarm.episodes import TRUNCATED, Episodes, StepResult
+from kinarm.episodes import TRUNCATED, Episodes
 from kinarm.errors import InvalidInputError
 from kinarm.goals import REST_PARTS
 from kinarm.kernels.goals import errors_between
 from kinarm.simulator import Simulator
+from kinarm.step_result import StepResult
 
 RewardType = Literal["sparse", "dense"]
 

@@ -8,9 +8,10 @@ from numpy.typing import DTypeLike
 
 from kinarm.envs.environment import ArmEnvironment, Array, Observations, one_by_one
 from kinarm.envs.extra import ExtraObservation
-from kinarm.episodes import COLLISION, RUNNING, SUCCESS, TRUNCATED, Episodes, StepResult
+from kinarm.episodes import COLLISION, RUNNING, SUCCESS, TRUNCATED, Episodes
 from kinarm.errors import finite_array
 from kinarm.problem import ProblemLike
+from kinarm.step_result import StepResult
 
 FIRST_ROW = np.zeros(1, dtype=np.int64)
 """The row of a batch of one."""

@@ -9,8 +9,8 @@ from configurations import random_configurations
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from kinarm.observation import Ranges
 from kinarm.observation_layout import ObservationLayout, observation_layout
+from kinarm.observation_part import Ranges
 from kinarm.problem import PROBLEMS
 
 REFLECTION = np.array([1.0, -1.0, 1.0])
