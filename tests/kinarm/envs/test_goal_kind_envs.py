@@ -2,7 +2,6 @@
 
 import warnings
 
-import gymnasium
 import numpy as np
 import pytest
 from gymnasium.utils.env_checker import check_env
@@ -74,7 +73,7 @@ def test_a_batch_is_like_single_arms():
 
 
 def test_a_goal_can_be_set():
-    env = gymnasium.make("kinarm/Reach-v0", goal={"kind": "direction"})
+    env = ReachEnv("right", goal={"kind": "direction"})
     goal = [0.3, -0.6, 0.4, 0.0, 0.0, -1.0]
     observation, _ = env.reset(seed=0, options={"goal": goal})
     np.testing.assert_array_equal(observation[48:51], goal[3:])
