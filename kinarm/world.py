@@ -1,7 +1,5 @@
 """The world of a problem: arm, scene, and questions about configurations."""
 
-from copy import copy
-from dataclasses import replace
 from functools import cached_property
 from typing import Any
 
@@ -9,7 +7,6 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from kinarm._parallel import available_threads, run_rows
-from kinarm.bodies import PARKED
 from kinarm.chain import Chain
 from kinarm.clearance import Clearance, flattened, measure_clearance
 from kinarm.collision import ContactModel
@@ -30,14 +27,14 @@ from kinarm.kernels.rollout import begin
 from kinarm.kernels.screening import screen
 from kinarm.kernels.session import Alone, Block, Session, furnish, work_space
 from kinarm.observation_layout import ObservationLayout
-from kinarm.plant import PlantLike
 from kinarm.problem import ProblemLike, ReachProblem
 from kinarm.scene_draws import SceneDraws
 from kinarm.shield import shield_table
 from kinarm.step_contact import StepContact
+from kinarm.world_changes import WorldChanges
 
 
-class World(GoalKinematics, StepContact):
+class World(GoalKinematics, StepContact, WorldChanges):
     """An arm in a scene.
 
     Parameters
@@ -98,29 +95,6 @@ class World(GoalKinematics, StepContact):
 
     def __repr__(self) -> str:
         return f"World({self.problem!r})"
-
-    def with_tolerance(self, tolerance: float) -> "World":
-        """The same world with another tolerance [m]; it shares all else."""
-        other = copy(self)
-        other.problem = self.problem.replace(tolerance=tolerance)
-        other.rules = self.rules._replace(tolerance=float(tolerance))
-        return other
-
-    def shielded(self, shield: bool = True) -> "World":
-        """The same world with or without a shield."""
-        other = copy(self)
-        other.problem = self.problem.replace(shield=shield)
-        other.rules = self.rules._replace(shield=shield_table(self.n_actions if shield else 0))
-        return other
-
-    def with_plant(self, plant: PlantLike) -> "World":
-        """The same world with another plant, itself, its name or file."""
-        other = copy(self)
-        other.problem = self.problem.replace(plant=plant)
-        commanded = int(other.problem.plant.feedback == "commanded")
-        other.rules = self.rules._replace(commanded=commanded)
-        other.plants = EpisodePlants(other.problem, other.rules.step_limit)
-        return other
 
     def __getstate__(self) -> dict[str, Any]:
         # A copy may get other rules or bodies, and needs its own work space.
@@ -215,33 +189,6 @@ class World(GoalKinematics, StepContact):
             return self._no_scenes
         drawn = self.problem.scene, self._draws, self.arm.chain
         return drawn_rows(*drawn, starts, np.ascontiguousarray(goals[:, :3]), self.threads)
-
-    def in_scene(self, start: ArrayLike, goal: ArrayLike) -> "World":
-        """The world of one episode, whose random bodies stay where they are.
-
-        Takes its start, shape (n_joints,) [rad or m], and its goal, shape (3 or goal_width,).
-        """
-        if not self.has_random_bodies:
-            return self
-        q = finite_array("start", start, (self.arm.n_joints,))
-        aim = finite_array("goal", goal, (None,))
-        other, scenes = copy(self), self.scenes_of(q[None], aim[None])
-        other.has_random_bodies = False
-        other.contact_model = self.contact_model.fixed(scenes[0])
-        return other
-
-    def without_moving_bodies(self) -> "World":
-        """The same world without the bodies that move."""
-        shapes = self.contact_model.shapes
-        if not len(shapes.moving):
-            return self
-        rows = shapes.placed.copy()
-        # What is on the other side of a half-space is far from its plane.
-        rows[shapes.moving, 13:] = PARKED[2] * rows[shapes.moving][:, [6, 9, 12]]
-        other, model = copy(self), self.contact_model.fixed(rows)
-        none = np.zeros(0, dtype=np.int64)
-        other.contact_model = replace(model, shapes=model.shapes._replace(moving=none))
-        return other
 
     def clearance(self, configurations: ArrayLike) -> Clearance:
         """Measure how far the closest of the tested pairs is apart, and where.

@@ -12,10 +12,11 @@ from kinarm.chain import Chain
 from kinarm.contact_shapes import PLANE, WITH_HALFSPACE, ContactShapes
 from kinarm.episodes import INTERVALS
 from kinarm.kernels.compiling import Array, helper, inlined
+from kinarm.kernels.lane_copies import moving_frame, place_between, put, take, take_rows
 from kinarm.kernels.lanes import any_lane, as_numbers, lane_bits, select
 from kinarm.kernels.overlap import overlap
 from kinarm.kernels.planes import DEPTH, EVERYDAY, FINE, GAP, height_above, propose, separate
-from kinarm.kernels.session import Alone, Block, moving_frame, place_between, put, take, take_rows
+from kinarm.kernels.session import Alone, Block
 
 MARGIN = 2e-6
 """Distance beyond which freedom is claimed [m].

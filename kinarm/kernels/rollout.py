@@ -13,6 +13,7 @@ from kinarm.episodes import COLLISION, PAUSED, RUNNING, SUCCESS, TRUNCATED, Epis
 from kinarm.kernels.arriving import arrive, measure, put_goal
 from kinarm.kernels.compiling import Array, inlined, lean_kernel
 from kinarm.kernels.kinematics import forward_kinematics, place_bodies
+from kinarm.kernels.lane_copies import move_bodies, put, put_scene, take, take_rows
 from kinarm.kernels.lanes import LANES, any_lane, as_numbers, lane_bits, select
 from kinarm.kernels.network import choose_actions, shared_policy
 from kinarm.kernels.planes import GAP
@@ -26,17 +27,7 @@ from kinarm.kernels.proof import (
     renew_planes,
 )
 from kinarm.kernels.reward import ROTATION, add_reward, observe, remember
-from kinarm.kernels.session import (
-    Session,
-    load_episode,
-    move_bodies,
-    put,
-    put_scene,
-    store_episode,
-    take,
-    take_number,
-    take_rows,
-)
+from kinarm.kernels.session import Session, load_episode, store_episode, take_number
 from kinarm.kernels.shield import fails_again, replace_step, take_down
 
 

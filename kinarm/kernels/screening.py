@@ -7,11 +7,12 @@ from kinarm.chain import Chain
 from kinarm.contact_shapes import ContactShapes
 from kinarm.kernels.compiling import Array, lean_kernel
 from kinarm.kernels.kinematics import forward_kinematics, to_world
+from kinarm.kernels.lane_copies import put, put_scene, take
 from kinarm.kernels.lanes import LANES, lane_bits
 from kinarm.kernels.overlap import deepest_overlap
 from kinarm.kernels.planes import DEPTH
 from kinarm.kernels.proof import prove_configurations
-from kinarm.kernels.session import Alone, Block, put, put_scene, take
+from kinarm.kernels.session import Alone, Block
 
 
 @lean_kernel

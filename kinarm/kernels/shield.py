@@ -11,9 +11,10 @@ from kinarm.contact_shapes import WITH_HALFSPACE, ContactShapes
 from kinarm.episodes import Episodes, Rules
 from kinarm.kernels.compiling import Array, helper, inlined
 from kinarm.kernels.kinematics import forward_kinematics, place_bodies
+from kinarm.kernels.lane_copies import place_between, take
 from kinarm.kernels.lanes import as_numbers
 from kinarm.kernels.planes import FINE, height_above, separate
-from kinarm.kernels.session import Alone, Block, place_between, take
+from kinarm.kernels.session import Alone, Block
 
 PROJECTIONS = 3
 """Largest number of projections, each of the one before."""

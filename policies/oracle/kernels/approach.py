@@ -17,9 +17,10 @@ from kinarm.chain import Chain, MotionBounds
 from kinarm.contact_shapes import ContactShapes
 from kinarm.kernels.compiling import Array, Vector, inlined, lean_kernel
 from kinarm.kernels.kinematics import POSE, place_bodies, point_jacobian
+from kinarm.kernels.lane_copies import put, take
 from kinarm.kernels.lanes import LANES, any_lane, as_numbers, lane_bits, lanes
 from kinarm.kernels.records import Fixed, Layout
-from kinarm.kernels.session import ONE, THREE, put, take
+from kinarm.kernels.session import ONE, THREE
 from kinarm.policies.oracle.kernels.box_proofs import (
     closest_step,
     curved_bound,

@@ -13,9 +13,10 @@ from kinarm.kernels.compiling import Array, Vector, inlined, lean_kernel
 from kinarm.kernels.inverse import damped_step as damped_step_of_rows
 from kinarm.kernels.inverse import orientation_error, take_out_blocked, take_step
 from kinarm.kernels.kinematics import POSE, forward_kinematics, point_jacobian, to_world
+from kinarm.kernels.lane_copies import put, take
 from kinarm.kernels.lanes import LANES, as_numbers, lane_bits, lanes, select
 from kinarm.kernels.records import Fixed, Layout
-from kinarm.kernels.session import ONE, THREE, put, take
+from kinarm.kernels.session import ONE, THREE
 from kinarm.policies.oracle.kernels.rotation import Turn
 
 ITERATIONS = 24

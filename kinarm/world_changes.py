@@ -1,0 +1,84 @@
+"""Worlds that differ from another one in a tolerance, a shield, a plant or bodies."""
+
+from copy import copy
+from dataclasses import replace
+from typing import Self
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from kinarm.arm import Arm
+from kinarm.bodies import PARKED
+from kinarm.collision import ContactModel
+from kinarm.episode_plants import EpisodePlants
+from kinarm.episodes import Rules
+from kinarm.errors import finite_array
+from kinarm.kernels.compiling import Array
+from kinarm.plant import PlantLike
+from kinarm.problem import ReachProblem
+from kinarm.shield import shield_table
+
+
+class WorldChanges:
+    """Makes other worlds of one; they share all else."""
+
+    problem: ReachProblem
+    arm: Arm
+    contact_model: ContactModel
+    rules: Rules
+    plants: EpisodePlants
+    has_random_bodies: bool
+
+    def scenes_of(self, starts: Array, goals: Array) -> Array:
+        """Rows of the bodies of each episode; see `kinarm.world.World`."""
+        raise NotImplementedError
+
+    def with_tolerance(self, tolerance: float) -> Self:
+        """The same world with another tolerance [m]; it shares all else."""
+        other = copy(self)
+        other.problem = self.problem.replace(tolerance=tolerance)
+        other.rules = self.rules._replace(tolerance=float(tolerance))
+        return other
+
+    def shielded(self, shield: bool = True) -> Self:
+        """The same world with or without a shield."""
+        other = copy(self)
+        other.problem = self.problem.replace(shield=shield)
+        other.rules = self.rules._replace(shield=shield_table(self.arm.n_actuated if shield else 0))
+        return other
+
+    def with_plant(self, plant: PlantLike) -> Self:
+        """The same world with another plant, itself, its name or file."""
+        other = copy(self)
+        other.problem = self.problem.replace(plant=plant)
+        commanded = int(other.problem.plant.feedback == "commanded")
+        other.rules = self.rules._replace(commanded=commanded)
+        other.plants = EpisodePlants(other.problem, other.rules.step_limit)
+        return other
+
+    def in_scene(self, start: ArrayLike, goal: ArrayLike) -> Self:
+        """The world of one episode, whose random bodies stay where they are.
+
+        Takes its start, shape (n_joints,) [rad or m], and its goal, shape (3 or goal_width,).
+        """
+        if not self.has_random_bodies:
+            return self
+        q = finite_array("start", start, (self.arm.n_joints,))
+        aim = finite_array("goal", goal, (None,))
+        other, scenes = copy(self), self.scenes_of(q[None], aim[None])
+        other.has_random_bodies = False
+        other.contact_model = self.contact_model.fixed(scenes[0])
+        return other
+
+    def without_moving_bodies(self) -> Self:
+        """The same world without the bodies that move."""
+        shapes = self.contact_model.shapes
+        if not len(shapes.moving):
+            return self
+        rows = shapes.placed.copy()
+        # What is on the other side of a half-space is far from its plane.
+        rows[shapes.moving, 13:] = PARKED[2] * rows[shapes.moving][:, [6, 9, 12]]
+        other, model = copy(self), self.contact_model.fixed(rows)
+        none = np.zeros(0, dtype=np.int64)
+        other.contact_model = replace(model, shapes=model.shapes._replace(moving=none))
+        return other
