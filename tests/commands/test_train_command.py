@@ -6,7 +6,6 @@ import signal
 import subprocess
 import sys
 import time
-from dataclasses import asdict
 from pathlib import Path
 
 import pytest
@@ -82,7 +81,8 @@ def test_every_setting_reaches_the_training(run, tmp_path):
     assert {name: made.config[name] for name in settings} == settings
     assert (made.recipe, made.seed) == ("brs*", 7)
     assert made.problem == PROBLEMS["both"].replace(arm="paper_flange", start_spread=0.5).pinned
-    assert made.config["reward"] == asdict(RewardWeights(success=0.25, collision=-2.0))
+    given = RewardWeights(**made.config["reward"])
+    assert given == RewardWeights(success=0.25, collision=-2.0)
     assert (made.config["normalize"], made.config["scale_by_deviation"]) == (True, False)
     assert made.config["symmetric"]
 
