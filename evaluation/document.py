@@ -12,7 +12,7 @@ from kinarm.errors import InvalidInputError, UnknownNameError, finite_array
 from kinarm.evaluation.bounds import Bounds, bounds_document
 from kinarm.evaluation.estimates import BOOTSTRAP_SEED, RESAMPLES
 from kinarm.evaluation.outcomes import Cause, Pair
-from kinarm.evaluation.schemas import Count, Digest, Document, Share
+from kinarm.evaluation.schemas import Count, Digest, Document, Goal, Share
 from kinarm.evaluation.statistics import LEVEL, Estimate
 from kinarm.evaluation.trials import TrialSet
 from kinarm.policies.oracle.solutions import OracleSolutions
@@ -56,7 +56,7 @@ class FacedProblem(Document, frozen=True, kw_only=True):
     digest: Digest
     trial_set_hash: Digest
     starts: list[list[float]]
-    goals: list[list[float]]
+    goals: list[Goal]
     oracle: Bounds | None
 
     @property

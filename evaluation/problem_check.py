@@ -9,7 +9,7 @@ from kinarm.clearance import SAMPLES, ContactStatistics, random_configurations
 from kinarm.evaluation.bounds import oracle_bounds
 from kinarm.evaluation.outcomes import Pair
 from kinarm.evaluation.report.templating import template_environment
-from kinarm.evaluation.schemas import Count, Digest, Document
+from kinarm.evaluation.schemas import Count, Digest, Document, Goal
 from kinarm.evaluation.statistics import Estimate
 from kinarm.evaluation.trials import TrialSet
 from kinarm.policies.mirror import mirror_findings
@@ -21,7 +21,7 @@ class MissedGoal(Document, frozen=True, kw_only=True):
     """A trial without a motion to the goal [m], and why."""
 
     trial: Count
-    goal: tuple[float, float, float]
+    goal: Goal
     reason: str
 
 
@@ -144,7 +144,7 @@ def _goals(trials: TrialSet, on_progress: Progress | None) -> Goals:
         out_of_reach=Estimate.share(out_of_reach),
         undecided=Estimate.share(~(reached | out_of_reach)),
         not_reached=[
-            MissedGoal(trial=trial, goal=tuple(goals[trial]), reason=reasons[trial])
+            MissedGoal(trial=trial, goal=goals[trial], reason=reasons[trial])
             for trial in np.flatnonzero(~reached).tolist()
         ],
     )

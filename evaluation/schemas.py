@@ -11,6 +11,7 @@ import msgspec
 
 Count = Annotated[int, msgspec.Meta(ge=0)]
 Share = Annotated[float, msgspec.Meta(ge=0, le=1)]
+Goal = Annotated[list[float], msgspec.Meta(min_length=3)]
 Digest = Annotated[str, msgspec.Meta(pattern="^[0-9a-f]{16}$")]
 
 

@@ -1,6 +1,6 @@
 """Rules, actions and episodes as arrays for kernels, and outcomes."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import partial
 from typing import Any, Literal, NamedTuple
 
@@ -273,11 +273,11 @@ class Rollouts:
     targets: Array
     moments: Array
     paths: Array
-    turn: Array
-    goals_reached: NDArray[np.int64]
-    goal_paths: Array
-    interventions: NDArray[np.int64]
-    replaced: NDArray[np.int64]
+    turn: Array = field(default_factory=lambda: np.zeros(0))
+    goals_reached: NDArray[np.int64] = field(default_factory=lambda: np.zeros(0, np.int64))
+    goal_paths: Array = field(default_factory=lambda: np.zeros((0, 0, 3)))
+    interventions: NDArray[np.int64] = field(default_factory=lambda: np.zeros(0, np.int64))
+    replaced: NDArray[np.int64] = field(default_factory=lambda: np.zeros(0, np.int64))
 
     @classmethod
     def from_episodes(cls, starts: Array, episodes: Episodes, *, copy: bool = False) -> "Rollouts":
