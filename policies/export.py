@@ -3,6 +3,7 @@
 import hashlib
 import io
 import json
+from collections.abc import Mapping
 from operator import methodcaller
 from pathlib import Path
 from typing import Any
@@ -15,14 +16,11 @@ from kinarm._files import absolute, check_folder, save_archive, shipped_files, w
 from kinarm.clearance import random_configurations
 from kinarm.errors import InvalidInputError, OutputError
 from kinarm.policies import arm_policy
-from kinarm.policies.conversion.to_torch import command_module, network_module, onnx_model
+from kinarm.policies.conversion.to_torch import command_module, onnx_model
 from kinarm.policies.policy import FORMAT_VERSION, Policy, policy_content
 from kinarm.world import World
 
-RUNTIME, CONTRACT, POLICY, README = "arm_policy.py", "contract.json", "policy.npz", "README.md"
-COMMANDS_ONNX, NETWORK_ONNX = "policy.onnx", "network.onnx"
-
-WITH_MEMORY = ("joint_velocities", "last_action", "time_left")
+WITH_MEMORY = {"joint_velocities", "last_action", "time_left"}
 """Parts of an observation that depend on more than joint positions, command and goal."""
 
 VECTORS = 10
@@ -36,11 +34,12 @@ GOALS = {
 }
 """What a row of a goal is, by its kind."""
 
-FRAMES = {
-    "world": "all positions and orientations are in the world, where the scene's base frame is",
-    "joints": "each joint frame in the one before: translation [m], then rotation at zero",
-    "quaternions": "w, x, y, z of unit length; joints turn by the right-hand rule about their axis",
-}
+FRAMES = (
+    "Goals and frames are in the world, in which the first joint is placed. A joint frame lies in "
+    "the one before by its translation [m] and then its rotation at zero; it turns about its axis "
+    "by the right-hand rule, or slides along it. The tool is in the frame of the last joint. "
+    "Rotations are quaternions w, x, y, z of unit length."
+)
 
 
 def export_policy(
@@ -79,9 +78,10 @@ def export_policy(
         )
     content, packed = policy_content(policy), io.BytesIO()
     save_archive(packed, "policy", FORMAT_VERSION, content.arrays, content.header, compress=True)
-    contract = _contract(policy, world) | {"self_test": _self_test(policy, world)}
+    contract = _contract(policy, world)
     contract["policy"]["sha256"] = hashlib.sha256(packed.getvalue()).hexdigest()
-    files = _onnx_files(policy, contract) if onnx else {}
+    contract["self_test"] = _self_test(policy, world, contract["resolution"])
+    files = _onnx_files(policy, content.arrays, contract) if onnx else {}
     contract["onnx"] = [*files]
     contract["digest"] = arm_policy.digest_of(contract)
     files |= {
@@ -98,101 +98,81 @@ def export_policy(
 
 def _contract(policy: Policy, world: World) -> dict[str, Any]:
     """What somebody who runs the policy has to know, and the runtime reads."""
-    problem, arm, layout = policy.problem, world.arm, world.layout
-    chain, rules, plant = arm.chain, world.goal_rules(), problem.plant
-    joints = [
-        {
-            "name": name,
-            "kind": "prismatic" if chain.prismatic[k] else "revolute",
-            "unit": "m" if chain.prismatic[k] else "rad",
-            "actuated": k < arm.n_actuated,
-            **{
-                each: float(getattr(chain, f"{each}s" if each == "velocity_limit" else each)[k])
-                for each in ("lower", "upper", "velocity_limit")
-            },
-            **{
-                each: getattr(chain, each)[k].tolist()
-                for each in ("translation", "rotation", "axis")
-            },
-        }
-        for k, name in enumerate(arm.joint_names)
-    ]
+    problem, arm, layout, made = policy.problem, world.arm, world.layout, policy.provenance
+    task, plant, dt, rules = problem.task, problem.plant, problem.stepping.time_step, world.rules
+    slides = arm.chain.prismatic.tolist()
+    columns = {
+        "name": arm.joint_names,
+        "kind": ["prismatic" if slide else "revolute" for slide in slides],
+        "unit": ["m" if slide else "rad" for slide in slides],
+        "actuated": [joint < arm.n_actuated for joint in range(arm.n_joints)],
+        "lower": arm.lower.tolist(),
+        "upper": arm.upper.tolist(),
+        "velocity_limit": arm.velocity_limits.tolist(),
+        **{each: getattr(arm.chain, each).tolist() for each in ("translation", "rotation", "axis")},
+    }
+    tool = {"position": arm.chain.tool, "rotation": rules.goal.frame, "axis": rules.goal.axis}
     parts = [
-        {
-            "name": part.name,
-            "meaning": part.meaning,
-            "unit": part.unit,
-            "start": place.start,
-            "length": place.stop - place.start,
-        }
-        for part, place in zip(layout.parts, layout.places.values(), strict=True)
+        {"name": part.name, "length": layout.length(part), "unit": part.unit, "is": part.meaning}
+        for part in layout.parts
     ]
+    memory = layout.history > 1 or not WITH_MEMORY.isdisjoint(layout.places)
+    kind, side = task.goal.kind, None if policy.mirror is None else policy.mirror.side
+    meant = {"kind": kind, "is": GOALS[kind], "length": world.goal_width}
     return {
         "made_by": f"kinarm {kinarm.__version__}",
         "policy": {
-            "name": f"{policy.provenance.algorithm} {policy.provenance.recipe}",
-            "seed": policy.provenance.seed,
+            "name": f"{made.algorithm} {made.recipe}",
+            "seed": made.seed,
             "activations": [*policy.activations],
-            "mirror_side": None if policy.mirror is None else policy.mirror.side,
+            "mirror_side": side,
         },
         "problem": {"name": problem.name, "digest": problem.digest},
         "arm": {"name": arm.name, "digest": arm.digest, "tool_frame": arm.tool_frame},
         "frames": FRAMES,
-        "joints": joints,
-        "tool": {
-            "position": chain.tool.tolist(),
-            "rotation": rules.frame.tolist(),
-            "axis": rules.axis.tolist(),
-        },
-        "time_step": problem.stepping.time_step,
-        "rate": 1.0 / problem.stepping.time_step,
-        "goal": {
-            "kind": problem.task.goal.kind,
-            "meaning": GOALS[problem.task.goal.kind],
-            "length": world.goal_width,
-            "tolerance": problem.task.tolerance,
-        },
+        "joints": [
+            {name: column[joint] for name, column in columns.items()}
+            for joint in range(arm.n_joints)
+        ],
+        "tool": {name: array.tolist() for name, array in tool.items()},
+        "time_step": dt,
+        "rate": 1.0 / dt,
+        "goal": {**meant, "tolerance": task.tolerance},
         "observation": {
             "parts": parts,
             "history": layout.history,
-            "horizon": problem.task.horizon,
+            "horizon": task.horizon,
+            "memory": memory,
         },
-        "shield": problem.stepping.shield,
         "plant": {"feedback": plant.feedback, **to_plain(plant)},
-        "resolution": _resolution(world),
+        "shield": problem.stepping.shield,
+        "resolution": 0.0 if isinstance(plant.resolution, tuple) else plant.resolution,
     }
 
 
-def _resolution(world: World) -> float:
-    """Steps of the commands [rad or m]; 0 for none, and if episodes draw them."""
-    lower, upper = world.problem.plant.range_of("resolution")
-    return lower if lower == upper else 0.0
-
-
-def _self_test(policy: Policy, world: World) -> list[dict[str, list[float]]]:
+def _self_test(policy: Policy, world: World, resolution: float) -> list[dict[str, list[float]]]:
     """Joint positions of arms at rest, goals, and kinarm's commands."""
-    arm, limit = world.arm, world.rules.step_limit
-    q = random_configurations(world.contact_model, VECTORS)
-    goals = world.reached(random_configurations(world.contact_model, VECTORS, seed=1))
-    command, n = q.copy(), arm.n_actuated
-    moved = q[:, :n] + policy(world.observe(q, goals)) * limit
+    arm, n = world.arm, world.arm.n_actuated
+    q, others = (random_configurations(world.contact_model, VECTORS, seed) for seed in (0, 1))
+    goals, command = world.reached(others), q.copy()
+    moved = q[:, :n] + policy(world.observe(q, goals)) * world.rules.step_limit
     command[:, :n] = np.clip(moved, arm.lower[:n], arm.upper[:n])
-    if step := _resolution(world):
-        command[:, :n] = np.round(command[:, :n] / step) * step
+    if resolution:
+        command[:, :n] = np.round(command[:, :n] / resolution) * resolution
     columns = {"joint_positions": q, "goal": goals, "command": command}
     return [{name: rows[k].tolist() for name, rows in columns.items()} for k in range(VECTORS)]
 
 
-def _onnx_files(policy: Policy, contract: dict[str, Any]) -> dict[str, bytes]:
+def _onnx_files(
+    policy: Policy, arrays: Mapping[str, Any], contract: dict[str, Any]
+) -> dict[str, bytes]:
     """The bare network, and unless the observation needs memory, all from joints to commands."""
-    layout, network = contract["observation"], network_module(policy)
+    shown, network, n = contract["observation"], policy.to_torch(), len(contract["joints"])
     files = {"network.onnx": onnx_model(network, {"observation": policy.n_observations}, "action")}
-    remembers = any(part["name"] in WITH_MEMORY for part in layout["parts"])
-    if remembers or layout["history"] > 1 or contract["resolution"]:
+    if shown["memory"] or contract["resolution"]:
         return files
-    n = len(contract["joints"])
     inputs = {"joint_positions": n, "goal": contract["goal"]["length"], "commanded": n}
-    return files | {"policy.onnx": onnx_model(command_module(policy, contract), inputs, "command")}
+    return files | {"policy.onnx": onnx_model(command_module(arrays, contract), inputs, "command")}
 
 
 def _readme(contract: dict[str, Any]) -> str:

@@ -240,7 +240,7 @@ class Policy:
         """Make a module of PyTorch that maps observations to actions, in double precision."""
         from kinarm.policies.conversion.to_torch import network_module
 
-        return network_module(self)
+        return network_module(policy_content(self).arrays, self.activations, self.mirror)
 
     def check_arm(self, arm: Arm) -> None:
         """Refuse an arm that the simulator treats otherwise than its own."""

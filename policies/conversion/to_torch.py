@@ -2,91 +2,75 @@
 
 import io
 import warnings
-from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
 
 from kinarm.errors import needed
-from kinarm.policies.arm_policy import Arm, Network, Seen, observe
-from kinarm.policies.normalizer import input_scale
-
-if TYPE_CHECKING:
-    from kinarm.policies.policy import Policy
+from kinarm.networks import Mirror
+from kinarm.policies.arm_policy import arm_arrays, choose_action, next_command, observe
 
 OPSET = 17
 """Version of ONNX's operators, from 2022."""
 
 
-def network_module(policy: "Policy") -> Any:
-    """A policy as a module, in double precision; its weights and biases are parameters.
+def module_of(arrays: Mapping[str, Any], function: Callable[..., Any]) -> Any:
+    """A module that computes a function of PyTorch, arrays and inputs.
 
-    MissingExtraError without PyTorch.
+    Weights and biases are its parameters. MissingExtraError without PyTorch.
     """
     torch = needed("torch", "torch", "export")
-    module: Any = torch.nn.Module
-    mirror, tensor = policy.mirror, torch.tensor
-    fixed = {"mean": tensor(policy.mean), "scale": tensor(input_scale(policy.std))}
-    if mirror is not None:
-        fixed |= {"signs": tensor(mirror.observations), "action_signs": tensor(mirror.actions)}
+    base: Any = torch.nn.Module
 
-    class NetworkModule(module):
-        """Observations, shape (..., n_observations), to actions, shape (..., n_actions)."""
-
+    class FunctionModule(base):
         def __init__(self) -> None:
             super().__init__()
-            self.layers = torch.nn.ModuleList()
-            for weights, bias in policy.layers:
-                layer = torch.nn.Linear(*weights.shape[::-1], dtype=torch.float64)
-                layer.weight.data, layer.bias.data = tensor(weights), tensor(bias)
-                self.layers.append(layer)
-            for name, values in fixed.items():
-                self.register_buffer(name, values)
+            for name, array in arrays.items():
+                tensor = torch.tensor(array)
+                if name.startswith(("weights", "bias")):
+                    self.register_parameter(name, torch.nn.Parameter(tensor))
+                else:
+                    self.register_buffer(name, tensor)
 
-        def forward(self, observations: Any) -> Any:
-            own: dict[str, Any] = {
-                "signs": None,
-                "action_signs": None,
-                **dict(self.named_buffers()),
-            }
-            pairs = zip(self.layers, policy.activations, strict=True)
-            layers = [(layer.weight, layer.bias, name) for layer, name in pairs]
-            side = None if mirror is None else mirror.side
-            return Network(**own, layers=layers, side=side).action(torch, observations)
+        def forward(self, *inputs: Any) -> Any:
+            held = {**dict(self.named_parameters()), **dict(self.named_buffers())}
+            return function(torch, held, *inputs)
 
-    return NetworkModule()
+    return FunctionModule()
 
 
-def command_module(policy: "Policy", contract: Mapping[str, Any]) -> Any:
-    """A module from joint positions, goal and last command to the next one, in single precision.
+def network_module(
+    arrays: Mapping[str, Any], activations: Sequence[str], mirror: Mirror | None
+) -> Any:
+    """A policy, by the arrays of its file: observations to actions."""
+    side = None if mirror is None else mirror.side
 
-    Takes the contract of an exported folder, whose observation needs nothing else.
+    def act(xp: Any, held: Any, observations: Any) -> Any:
+        return choose_action(xp, held, list(activations), side, observations)
+
+    return module_of(arrays, act)
+
+
+def command_module(arrays: Mapping[str, Any], contract: Mapping[str, Any]) -> Any:
+    """A policy with all that is about it: joint positions, goal and last command to the next one.
+
+    Takes the arrays of its file, and its contract, whose observation needs nothing else.
     """
-    torch = needed("torch", "torch", "export")
-    module: Any = torch.nn.Module
-    arm = Arm(*(torch.tensor(each, dtype=torch.float32) for each in Arm.of(contract)))
-    names, n = [part["name"] for part in contract["observation"]["parts"]], len(arm.step)
+    made, n = contract["policy"], sum(each["actuated"] for each in contract["joints"])
+    names = [part["name"] for part in contract["observation"]["parts"]]
 
-    class CommandModule(module):
-        def __init__(self) -> None:
-            super().__init__()
-            self.network = network_module(policy).float()
+    def command(xp: Any, held: Any, joints: Any, goal: Any, last: Any) -> Any:
+        told = xp.concatenate([last[..., :n], joints[..., n:]], -1)
+        seen = told if contract["plant"]["feedback"] == "commanded" else joints
+        x = observe(xp, held, names, seen, told, goal)
+        action = choose_action(xp, held, made["activations"], made["mirror_side"], x)
+        return xp.concatenate([next_command(xp, held, told, action), last[..., n:]], -1)
 
-        def forward(self, joints: Any, goal: Any, commanded: Any) -> Any:
-            told = torch.concatenate([commanded[..., :n], joints[..., n:]], -1)
-            sees = told if contract["plant"]["feedback"] == "commanded" else joints
-            seen = Seen(joints=sees, commanded=told, goal=goal)
-            command = arm.command(torch, told, self.network(observe(torch, arm, names, seen)))
-            return torch.concatenate([command, commanded[..., n:]], -1)
-
-    return CommandModule()
+    return module_of({**arrays, **arm_arrays(contract)}, command)
 
 
 def onnx_model(module: Any, inputs: Mapping[str, int], output: str) -> bytes:
-    """A module in ONNX, with inputs of such lengths, shape (n, length) in float32.
-
-    MissingExtraError without the package onnx.
-    """
-    torch = needed("torch", "torch", "export")
-    needed("onnx", "onnx", "export")  # which PyTorch needs
+    """A module in ONNX, with inputs of such lengths, shape (n, length), in single precision."""
+    torch, _ = needed("torch", "torch", "export"), needed("onnx", "onnx", "export")
     written = io.BytesIO()
     with warnings.catch_warnings(action="ignore"):  # of a way that PyTorch means to replace
         torch.onnx.export(

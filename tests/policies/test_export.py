@@ -248,6 +248,7 @@ class TestContract:
         assert len(contract["self_test"]) == 10
         names = [part["name"] for part in contract["observation"]["parts"]]
         assert names == ["goal", "goal_minus_tool", "orientation", "position"]
+        assert not contract["observation"]["memory"]
 
     def test_policy_is_a_file_of_kinarm(self, exported):
         assert Policy.load(exported / "policy.npz").problem == load_policy("ars-tuned-both").problem
@@ -375,7 +376,8 @@ class TestONNX:
 
     def test_memory_is_left_to_the_runtime(self, tmp_path):
         problem = ReachProblem.load("both").replace(observation={"history": 2})
-        assert export_policy(policy_for(problem), tmp_path / "out")["onnx"] == ["network.onnx"]
+        contract = export_policy(policy_for(problem), tmp_path / "out")
+        assert (contract["onnx"], contract["observation"]["memory"]) == (["network.onnx"], True)
 
 
 def test_model_of_stable_baselines3(tmp_path):
