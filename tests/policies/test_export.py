@@ -22,7 +22,9 @@ from kinarm.policies.mirror import problem_mirror
 from kinarm.policies.policy import Layer
 from kinarm.policies.provenance import Provenance
 
-N, STEPS = 10_000, 24
+N, STEPS = 14_000, 24
+"""Configurations that are drawn, of which 10,000 of the paper's arm touch nothing; and steps."""
+
 EMPTY = Scene(obstacles=(), ground=False)
 
 
