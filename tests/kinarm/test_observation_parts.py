@@ -14,6 +14,7 @@ from kinarm import Observation, Plant, ReachProblem, Simulator
 from kinarm.bodies import Body, RandomBodies
 from kinarm.body_motion import BodyMotion
 from kinarm.errors import InvalidInputError, KinarmError
+from kinarm.goals import GOAL_RESTS, REST_ERRORS
 from kinarm.kernels.surroundings import NEAR
 from kinarm.networks import Layer, Networks
 from kinarm.observation import OBSERVATION
@@ -21,7 +22,7 @@ from kinarm.reference import ReferenceSimulator
 from kinarm.scene import Scene
 
 BOTH = ReachProblem.load("both")
-ALL = tuple(part.name for part in OBSERVATION)
+ALL = tuple(part.name for part in OBSERVATION if part.name not in GOAL_RESTS + REST_ERRORS)
 FALLING = RandomBodies(
     name="it",
     shape="box",
