@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from known_arms import INSTALLED
 from reference_episodes import held_actions
 
 from kinarm.bodies import RandomBodies
@@ -31,7 +32,7 @@ def cluttered(name):
     return problem.replace(scene=replace(problem.scene, random_bodies=(CLUTTER,)))
 
 
-@pytest.fixture(params=["right", "cluttered", "benches-ur5", "desk-so101"])
+@pytest.fixture(params=["right", "cluttered", pytest.param("benches-ur5", marks=INSTALLED)])
 def simulator(request):
     problem = cluttered("right") if request.param == "cluttered" else request.param
     return Simulator(problem, threads=2)
