@@ -183,7 +183,7 @@ class GoalKinematics(InverseKinematics):
 
     @cached_property
     def reachable_of_sample(self) -> int:
-        """Of how many of `SAMPLE` goals a configuration is found, with nothing random around."""
+        """Of how many of ``SAMPLE`` goals a configuration is found, with nothing random around."""
         goals = self.goals.draw(np.random.default_rng(0), SAMPLE)
         nothing = np.zeros((0, *self.contact_model.shapes.placed.shape))
         return int(self.solved_goals(goals, np.zeros(SAMPLE), nothing)[0].sum())

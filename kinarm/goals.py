@@ -123,7 +123,7 @@ class GoalSpecification(Checked):
 
     @cached_property
     def told(self) -> tuple[str, ...]:
-        """What episodes tell beside the distance: ``turn`` and ``goals_reached``."""
+        """Names of what episodes tell beside the distance, ``turn`` and ``goals_reached``."""
         several = ("goals_reached",) if self.sequence > 1 else ()
         return ("turn", *several) if self.number else several
 

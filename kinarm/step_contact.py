@@ -93,7 +93,7 @@ class StepContact:
         return rows
 
     def decided(self, episodes: Episodes, rows: NDArray[np.int64]) -> tuple[NDArray[np.bool_], int]:
-        """Let Coal decide about the steps of some episodes; see `steps_in_contact`."""
+        """Let Coal decide about the steps of some episodes; see ``steps_in_contact``."""
         bodies = episodes.scenes_at(rows), episodes.steps[rows]
         steps = self.steps_of(episodes.q[rows], episodes.target[rows], *bodies)
         return steps_in_contact(steps, episodes.doubt[rows], self.rules)

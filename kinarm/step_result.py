@@ -16,8 +16,8 @@ class StepResult(NamedTuple):
     ----------
     numbers : ndarray, shape (2 + n_told + n_terms, n)
         Rewards, distances to the goal [m], what goals have beside it
-        (`kinarm.goals.GoalSpecification.told`), and weighted terms, as in
-        `kinarm.ReachTask.reward_terms`. Rewards are zero for episodes that were
+        (``GoalSpecification.told``), and weighted terms, as in
+        ``RewardWeights.terms``. Rewards are zero for episodes that were
         over.
     flags : ndarray of bool, shape (3, n)
         Truncation, success and refusal by contact; false for episodes that go

@@ -73,7 +73,7 @@ class RewardWeights(Checked):
 
     @cached_property
     def terms(self) -> tuple[str, ...]:
-        """Names of the terms: `REWARD_TERMS`, and ``rotation`` if it counts."""
+        """The names of `REWARD_TERMS`, and ``rotation`` if it counts."""
         return (*REWARD_TERMS, "rotation") if self.rotation else REWARD_TERMS
 
 
