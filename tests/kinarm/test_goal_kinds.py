@@ -43,8 +43,11 @@ def simulator_of(goal, **settings):
     reward = {"progress": 2.0, "closer": 0.125, "step": -0.25, "collision": -3.0, "success": 5.0}
     if goal.get("kind"):
         reward["rotation"] = 0.3
-    settings = {"horizon": HORIZON, "tolerance": 0.04, "reachable_goals": True, **settings}
-    problem = ReachProblem.load("both").replace(goal=goal, reward=reward, **settings)
+    # The reference looks at each of these configurations.
+    settings = {"tested_configurations": 4, "tolerance": 0.04, "reachable_goals": True, **settings}
+    problem = ReachProblem.load("both").replace(
+        goal=goal, reward=reward, horizon=HORIZON, **settings
+    )
     return Simulator(problem, threads=1)
 
 
