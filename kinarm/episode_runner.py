@@ -12,7 +12,6 @@ from kinarm.errors import StartInContactError, finite_array
 from kinarm.kernels.compiling import Array
 from kinarm.kernels.rollout import advance, allow_one_step, begin, refuse
 from kinarm.kernels.session import Session
-from kinarm.kernels.shield import TRIED
 from kinarm.networks import PolicyFunction, takes_rows
 from kinarm.scenarios import draw_followers
 from kinarm.world import World
@@ -133,18 +132,10 @@ class EpisodeRunner:
         episodes = session.episodes
         refused, asked = self.world.decided(episodes, paused)
         self.checked_by_coal += asked
-        if len(self.world.rules.shield):
-            rows = paused[refused]
-            episodes.blocker[rows], episodes.touched[rows] = -1, 0
-            episodes.attempt[rows], episodes.tried[rows] = 1, 0.0
-            episodes.projected[rows, -2:] = TRIED, 0.0
-            episodes.status[paused], episodes.cleared[paused] = RUNNING, ~refused
-            return paused
-        resumed: NDArray[np.int64] = paused[~refused]
-        episodes.status[resumed] = RUNNING
-        episodes.cleared[paused] = ~refused
+        episodes.status[paused], episodes.cleared[paused] = RUNNING, ~refused
         if refused.any():
             refuse(paused[refused], session)
+        resumed: NDArray[np.int64] = paused[episodes.status[paused] == RUNNING]
         return resumed
 
     @one_torch_thread()

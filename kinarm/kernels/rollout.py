@@ -142,7 +142,7 @@ def advance(counters: NDArray[np.int64], session: Session) -> int:
             return n_paused
         # Act, unless Coal has found the step under way free.
         choose_actions(control, shared, row, block)
-        if shielded:
+        if any_lane(block.attempt[0] > 0.0):
             for lane in range(row.shape[0]):
                 if row[lane] >= 0 and episodes.attempt[row[lane]] > 0:
                     given = rules, episodes, block, alone
@@ -209,7 +209,7 @@ def advance(counters: NDArray[np.int64], session: Session) -> int:
         block.cleared[0] = 0.0
         nearer = block.distance[0]
         block.steps[0] += 1.0
-        if shielded:
+        if any_lane(block.attempt[0] > 0.0):
             for lane in range(row.shape[0]):
                 if row[lane] >= 0 and episodes.attempt[row[lane]] > 0:
                     take_down(lane, row[lane], episodes, block)
@@ -301,9 +301,13 @@ def results_of_step(
 
 @lean_kernel
 def refuse(rows: NDArray[np.int64], session: Session) -> None:
-    """End episodes whose step Coal found to touch."""
+    """End episodes whose step Coal found to touch, or let a shield replace it."""
+    rules, episodes = session.rules, session.episodes
     for index in range(rows.shape[0]):
-        refuse_step(rows[index], session.rules, session.episodes)
+        if rules.shield.shape[0] > 0:
+            fails_again(rows[index], 0, episodes)
+        else:
+            refuse_step(rows[index], rules, episodes)
 
 
 @inlined

@@ -34,7 +34,7 @@ def fails_again(e: int, pair: int, episodes: Episodes) -> None:
     """Note that an episode's step touches a pair, from 1; 0 if that is not known."""
     last = episodes.projected.shape[1] - 2
     if episodes.attempt[e] == 0:
-        episodes.tried[e], episodes.blocker[e] = 0.0, pair
+        episodes.tried[e], episodes.blocker[e] = 0.0, pair if pair > 0 else -1
         episodes.projected[e, last], episodes.projected[e, last + 1] = TRIED, 0.0
     episodes.attempt[e] += 1
     episodes.touched[e] = pair
