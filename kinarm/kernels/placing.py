@@ -33,6 +33,14 @@ def mixed(state: np.uint64) -> np.uint64:
 
 
 @helper
+def seed_state(state: NDArray[np.uint64], seed: int, bits: NDArray[np.uint64], e: int) -> None:
+    """Begin an episode's generator with a seed and the bits of its goal and start."""
+    state[0] = np.uint64(seed)
+    for i in range(bits.shape[1]):
+        state[0] = mixed(state[0] + np.uint64(STEP)) ^ bits[e, i]
+
+
+@helper
 def uniform(state: NDArray[np.uint64]) -> float:
     """Next number in [0, 1)."""
     state[0] += np.uint64(STEP)
@@ -102,9 +110,7 @@ def draw_scenes(
         rows, goal = scenes[e], (goals[e, 0], goals[e, 1], goals[e, 2])
         rows[:] = draws.placed
         failed[e] = 0
-        state[0] = np.uint64(draws.seed)
-        for i in range(bits.shape[1]):
-            state[0] = mixed(state[0] + np.uint64(STEP)) ^ bits[e, i]
+        seed_state(state, draws.seed, bits, e)
         forward_kinematics(chain, starts, e, poses)
         tool = to_world(poses, starts.shape[1], chain.tool[0], chain.tool[1], chain.tool[2])
         for entry in range(draws.entries.shape[0]):

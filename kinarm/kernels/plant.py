@@ -15,9 +15,12 @@ from kinarm.kernels.compiling import Array, inlined, kernel
 from kinarm.kernels.elementary import exponential, nearest_whole, sine_cosine
 from kinarm.kernels.kinematics import forward_kinematics
 from kinarm.kernels.lanes import any_lane, as_numbers, select
-from kinarm.kernels.placing import FIRST, STEP, mixed, uniform
+from kinarm.kernels.placing import STEP, mixed, seed_state, uniform
 from kinarm.kernels.session import Block
 from kinarm.plant import PlantDraws
+
+SEED = 0xBF58476D1CE4E5B9
+"""Begins the random numbers of plants, which are not those of scenes."""
 
 SUBSTEPS = 5
 """Parts of a step in which limits of velocity, acceleration and jerk hold."""
@@ -60,9 +63,7 @@ def draw_plants(
     part, n_actuated = draws.time_step / SUBSTEPS, draws.step_limit.shape[0]
     for e in range(first, last):
         plant = plants[e]
-        state[0] = np.uint64(FIRST)
-        for i in range(bits.shape[1]):
-            state[0] = mixed(state[0] + np.uint64(STEP)) ^ bits[e, i]
+        seed_state(state, SEED, bits, e)
         plant[HIGH_BITS] = float(state[0] >> np.uint64(32))
         plant[LOW_BITS] = float(state[0] & np.uint64(0xFFFFFFFF))
         for i in range(drawn.shape[0]):
