@@ -58,12 +58,13 @@ class GoalKinematics(InverseKinematics):
                 raise ProblemError(f"{name} is in contact: {pair[0]} touches {pair[1]}")
         return configurations
 
-    def goal_rules(self) -> GoalRules:
-        """What is to be reached, and how, for the kernels."""
+    @cached_property
+    def goal_rules(self) -> Any:
+        """Record of what is to be reached, and how; see ``kinarm.kernels.goals``."""
         task, dt = self.problem.task, self.problem.stepping.time_step
         goal, times = task.goal, np.arange(task.horizon + 1, dtype=np.float64) * dt
         x, y, z, w = pin.Quaternion(self.tool.placement[:3, :3]).coeffs()
-        return GoalRules(
+        rules = GoalRules(
             kind=goal.number,
             hold=goal.hold,
             sequence=goal.sequence,
@@ -74,6 +75,7 @@ class GoalKinematics(InverseKinematics):
             frame=np.array([w, x, y, z]),
             moves=goal.motion.offsets(times) if goal.motion else np.zeros((0, 3)),
         )
+        return recorded(rules)
 
     @cached_property
     def goal_width(self) -> int:
@@ -85,7 +87,7 @@ class GoalKinematics(InverseKinematics):
         """Lowest and highest positions of goals, shape (3,) each [m]."""
         if self.problem.task.goal.configurations:
             return self.goals.lower.min(axis=0), self.goals.lower.max(axis=0)
-        scene, moves = self.problem.scene, self.goal_rules().moves
+        scene, moves = self.problem.scene, self.goal_rules.moves
         regions = [scene.goal_region(name) for name in self.problem.task.goal_regions]
         lower = np.min([region.lower for region in regions], axis=0)
         upper = np.max([region.upper for region in regions], axis=0)
@@ -192,8 +194,7 @@ class GoalKinematics(InverseKinematics):
         """What the tool reaches at configurations, as goals are, shape (n, goal_width)."""
         q = finite_array("configurations", configurations, (None, self.arm.n_joints))
         rows, poses = np.empty((len(q), self.goal_width)), np.empty((q.shape[1] + 1, POSE))
-        chain, goal = recorded(self.arm.chain), recorded(self.goal_rules())
-        fill_reached(chain, goal, q, poses, rows)
+        fill_reached(recorded(self.arm.chain), self.goal_rules, q, poses, rows)
         return rows
 
     def screened(self, q: Array, scenes: Array | None = None) -> tuple[Array, NDArray[np.bool_]]:

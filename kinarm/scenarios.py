@@ -85,14 +85,15 @@ def draw_for_each(
         else:
             starts[pending, :n_actions] = lower + uniforms * extent
         proposed = starts[pending]
-        tools, touching = world.screened(proposed, world.scenes_of(proposed, aims))
+        scenes = world.scenes_of(proposed, aims)
+        tools, touching = world.screened(proposed, scenes)
         x, y, z = (tools - aims[:, :3]).T
         rejected = touching | (np.sqrt(x * x + y * y + z * z) <= task.tolerance)
         if solved:
             missed = ~rejected
             tried = pending[missed]
-            scenes = world.scenes_of(proposed[missed], aims[missed])
-            found, goals[tried] = world.solved_goals(aims[missed], drawn[tried, -1], scenes)
+            there = scenes[missed] if len(scenes) else scenes
+            found, goals[tried] = world.solved_goals(aims[missed], drawn[tried, -1], there)
             missed[missed] = ~found
             rows = pending[missed]
             wanted = np.bincount(rows // max(count, 1), minlength=len(rngs)).tolist()

@@ -12,7 +12,6 @@ from kinarm.clearance import Clearance, flattened, measure_clearance
 from kinarm.collision import ContactModel
 from kinarm.contact_shapes import PLANE, ContactShapes, unit_boxes
 from kinarm.episode_plants import EpisodePlants
-from kinarm.episode_scenes import drawn_rows
 from kinarm.episodes import Control, Episodes, Rules
 from kinarm.errors import (
     finite_array,
@@ -28,7 +27,6 @@ from kinarm.kernels.screening import screen
 from kinarm.kernels.session import Alone, Block, Session, furnish, work_space
 from kinarm.observation_layout import ObservationLayout
 from kinarm.problem import ProblemLike, ReachProblem
-from kinarm.scene_draws import SceneDraws
 from kinarm.shield import shield_table
 from kinarm.step_contact import StepContact
 from kinarm.world_changes import WorldChanges
@@ -86,7 +84,7 @@ class World(GoalKinematics, StepContact, WorldChanges):
             shown=self.layout.shown,
             width=self.layout.width,
             boxes=unit_boxes(self.problem.scene.bodies),
-            goal=recorded(self.goal_rules()),
+            goal=self.goal_rules,
             shield=shield_table(self.arm.n_actuated if stepping.shield else 0),
         )
         self.plants = EpisodePlants(self.problem, self.rules.step_limit)
@@ -170,25 +168,6 @@ class World(GoalKinematics, StepContact, WorldChanges):
         arrays = (chain, shapes, q, scenes, tools, free, touching)
         n_proven = run_rows(self._screen_some, n, n, self.threads, *arrays)
         return tools, free, touching, n_proven
-
-    @cached_property
-    def _draws(self) -> SceneDraws:
-        return SceneDraws.of(self.problem.scene)
-
-    @cached_property
-    def _no_scenes(self) -> Array:
-        return np.zeros((0, *self.contact_model.shapes.placed.shape))
-
-    def scenes_of(self, starts: Array, goals: Array) -> Array:
-        """Rows of the bodies of each episode, shape (n, n_placed, 16); empty if all have the same.
-
-        See `kinarm.contact_shapes.ContactShapes.placed`. Takes starts, shape (n, n_joints) [rad or
-        m], and goals, shape (n, goal_width); ProblemError if a body finds no place.
-        """
-        if not self.has_random_bodies:
-            return self._no_scenes
-        drawn = self.problem.scene, self._draws, self.arm.chain
-        return drawn_rows(*drawn, starts, np.ascontiguousarray(goals[:, :3]), self.threads)
 
     def clearance(self, configurations: ArrayLike) -> Clearance:
         """Measure how far the closest of the tested pairs is apart, and where.

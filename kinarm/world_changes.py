@@ -1,7 +1,8 @@
-"""Worlds that differ from another one in a tolerance, a shield, a plant or bodies."""
+"""The scenes of episodes, and worlds that differ in one of them, a tolerance, shield or plant."""
 
 from copy import copy
 from dataclasses import replace
+from functools import cached_property
 from typing import Self
 
 import numpy as np
@@ -11,11 +12,13 @@ from kinarm.arm import Arm
 from kinarm.bodies import PARKED
 from kinarm.collision import ContactModel
 from kinarm.episode_plants import EpisodePlants
+from kinarm.episode_scenes import drawn_rows
 from kinarm.episodes import Rules
 from kinarm.errors import finite_array
 from kinarm.kernels.compiling import Array
 from kinarm.plant import PlantLike
 from kinarm.problem import ReachProblem
+from kinarm.scene_draws import SceneDraws
 from kinarm.shield import shield_table
 
 
@@ -28,10 +31,26 @@ class WorldChanges:
     rules: Rules
     plants: EpisodePlants
     has_random_bodies: bool
+    threads: int
+
+    @cached_property
+    def _draws(self) -> SceneDraws:
+        return SceneDraws.of(self.problem.scene)
+
+    @cached_property
+    def _no_scenes(self) -> Array:
+        return np.zeros((0, *self.contact_model.shapes.placed.shape))
 
     def scenes_of(self, starts: Array, goals: Array) -> Array:
-        """Rows of the bodies of each episode; see `kinarm.world.World`."""
-        raise NotImplementedError
+        """Rows of the bodies of each episode, shape (n, n_placed, 16); empty if all have the same.
+
+        See `kinarm.contact_shapes.ContactShapes.placed`. Takes starts, shape (n, n_joints) [rad or
+        m], and goals, shape (n, goal_width); ProblemError if a body finds no place.
+        """
+        if not self.has_random_bodies:
+            return self._no_scenes
+        drawn = self.problem.scene, self._draws, self.arm.chain
+        return drawn_rows(*drawn, starts, np.ascontiguousarray(goals[:, :3]), self.threads)
 
     def with_tolerance(self, tolerance: float) -> Self:
         """The same world with another tolerance [m]; it shares all else."""
