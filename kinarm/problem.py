@@ -15,13 +15,7 @@ import numpy as np
 import tomli_w
 from numpy.typing import NDArray
 
-from kinarm._fields import (
-    OPTIONAL,
-    Checked,
-    from_plain,
-    init_fields,
-    to_plain,
-)
+from kinarm._fields import OPTIONAL, Checked, from_plain, init_fields, to_plain
 from kinarm._files import absolute, named_file, write_text
 from kinarm.arm_specification import ArmSpecification
 from kinarm.errors import ProblemError, UnknownNameError

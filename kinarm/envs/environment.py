@@ -36,16 +36,8 @@ Outcome = tuple[Array, NDArray[np.bool_], NDArray[np.bool_]]
 DTYPES = ("float64", "float32")
 
 SETTINGS = (
-    *(
-        "render_mode",
-        "width",
-        "height",
-        "camera",
-        "observation_dtype",
-        "reward_type",
-        "extra_observation",
-    ),
-    *("num_envs", "autoreset_mode", "threads", "vectorization_mode"),
+    *("render_mode", "width", "height", "camera", "observation_dtype", "reward_type"),
+    *("extra_observation", "num_envs", "autoreset_mode", "threads", "vectorization_mode"),
 )
 """Arguments of environments beside their problem's."""
 
