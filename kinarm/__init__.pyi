@@ -19,6 +19,7 @@ from .errors import ArmError as ArmError
 from .errors import InvalidInputError as InvalidInputError
 from .errors import KinarmError as KinarmError
 from .errors import MissingExtraError as MissingExtraError
+from .errors import NoPathError as NoPathError
 from .errors import OutputError as OutputError
 from .errors import PolicyFileError as PolicyFileError
 from .errors import ProblemError as ProblemError

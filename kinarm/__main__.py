@@ -15,6 +15,7 @@ COMMANDS = {
     "train": ("kinarm.evaluation.commands.train", "train a policy"),
     "eval": ("kinarm.evaluation.commands.evaluate", "evaluate policies beside the oracle"),
     "replay": ("kinarm.evaluation.commands.replay", "watch what policies do, in a browser"),
+    "plan": ("kinarm.evaluation.commands.plan", "plan a motion of an arm that touches nothing"),
     "export": ("kinarm.evaluation.commands.export", "run a policy on an arm, without kinarm"),
     "study": ("kinarm.evaluation.commands.study", "compare learners and their settings"),
     "problem": ("kinarm.evaluation.commands.problem", "look at problems, and check your own"),

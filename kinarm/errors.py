@@ -8,9 +8,9 @@
     ├── InvalidInputError, which is a ValueError
     │   └── UnknownNameError
     ├── StartInContactError, MissingExtraError
-    └── WorkerError, TrainingFailedError
+    └── WorkerError, TrainingFailedError, NoPathError
 
-Command lines turn them into one line on standard error and exit status 2, or 1 for the last two,
+Command lines turn them into one line on standard error and exit status 2, or 1 for the last three,
 failures of a run.
 """
 
@@ -152,6 +152,23 @@ class TrainingFailedError(KinarmError):
         self.reasons, self.trainings = dict(reasons), trainings
         told = "; ".join(f"{name}: {reason}" for name, reason in reasons.items())
         super().__init__(f"{len(reasons)} of {trainings} trainings failed: {told}")
+
+
+class NoPathError(KinarmError):
+    """No path without contact was found, which proves nothing.
+
+    Parameters
+    ----------
+    samples : int
+        Samples that were tried.
+    """
+
+    exit_status = 1
+
+    def __init__(self, samples: int) -> None:
+        self.samples = samples
+        many = "1 sample" if samples == 1 else f"{samples} samples"
+        super().__init__(f"no path found with {many}: there may be none")
 
 
 class MissingExtraError(KinarmError):

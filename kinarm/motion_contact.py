@@ -66,7 +66,9 @@ def steps_in_contact(
     return touching, asked
 
 
-def first_share(step: Step, low: float, high: float) -> tuple[float | None, int]:
+def first_share(
+    step: Step, low: float, high: float, *, margin: float = 0.0, most: int = MOST_ASKED
+) -> tuple[float | None, int]:
     """Earliest share of a step that touches, and how many configurations were asked.
 
     What comes within `TOUCHING` touches, and what cannot be told from it.
@@ -77,6 +79,10 @@ def first_share(step: Step, low: float, high: float) -> tuple[float | None, int]
         The step.
     low, high : float
         Shares between which is looked.
+    margin : float
+        Distance that counts as contact, too [m].
+    most : int
+        Configurations after which it counts as contact.
     """
     motion = step.motion
     waiting, asked = [(low, high, np.arange(len(motion)))], 0
@@ -85,9 +91,9 @@ def first_share(step: Step, low: float, high: float) -> tuple[float | None, int]
         middle, asked = 0.5 * (low + high), asked + 1
         distances, _ = _distances(*step.at(middle), pairs)
         reach = motion[pairs] * 0.5 * (high - low)
-        near = distances - reach <= TOUCHING
+        near = distances - reach <= TOUCHING + margin
         if near.any():
-            if reach[near].max() < TOLD_APART or asked > MOST_ASKED:
+            if reach[near].max() < TOLD_APART or asked > most:
                 return middle, asked
             # The last one is looked at first.
             waiting += [(middle, high, pairs[near]), (low, middle, pairs[near])]

@@ -21,6 +21,9 @@ from .oracle import Oracle as Oracle
 from .oracle import OracleSolution as OracleSolution
 from .oracle import OracleSolutions as OracleSolutions
 from .oracle import inverse_kinematics as inverse_kinematics
+from .planning.plans import Plan as Plan
+from .planning.plans import plan as plan
+from .planning.settings import PlanSettings as PlanSettings
 from .policy import Layer as Layer
 from .policy import Policy as Policy
 from .ppo import PPOConfig as PPOConfig

@@ -6,7 +6,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kinarm.kernels.compiling import Array
-from kinarm.policies.oracle.detours import find_detour, on_path
 from kinarm.policies.oracle.inverse import (
     Solutions,
     inverse_kinematics,
@@ -15,6 +14,8 @@ from kinarm.policies.oracle.inverse import (
     steps_between,
 )
 from kinarm.policies.oracle.stages import Stage
+from kinarm.policies.planning.motions import Motions
+from kinarm.policies.planning.paths import find_path, on_path
 from kinarm.randomness import low_discrepancy_points
 from kinarm.simulator import Simulator
 
@@ -107,7 +108,11 @@ class MotionSearch:
 
     def try_detours(self, rows: NDArray[np.int64]) -> None:
         """Plan detours where no motion reaches the goal yet, if it stands."""
-        for row in rows[~self.reached[rows]] if self.stage.walks is None else []:
+        missed = rows[~self.reached[rows]]
+        if self.stage.walks is not None or missed.size == 0:
+            return
+        motions = Motions(self._resting.world)
+        for row in missed:
             ends = inverse_kinematics(self._resting, self.starts[row], self.stage.goals[row])
             if len(ends) == 0:
                 continue
@@ -118,7 +123,7 @@ class MotionSearch:
             digest = hashlib.sha256(numbers.tobytes()).digest()
             rng = np.random.default_rng(np.frombuffer(digest, dtype=np.uint32))
             for _ in range(DETOURS):
-                path = find_detour(self._resting, self.starts[row], ends, rng)
+                path = find_path(motions, self.starts[row], ends, rng)
                 if path is None:
                     break
                 for through_corners in (False, True):

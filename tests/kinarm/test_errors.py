@@ -18,6 +18,7 @@ EXAMPLES = [
     errors.MissingExtraError("torch", "sb3"),
     errors.WorkerError("a worker ended"),
     errors.TrainingFailedError({"ars right seed 0": "too fast"}, 4),
+    errors.NoPathError(100),
 ]
 
 

@@ -1,0 +1,1 @@
+"""Plans: contact-free paths of an arm, and motions along them."""

@@ -1,0 +1,138 @@
+"""Kernels that prove straight motions of an arm free of contact, and find the shortest one."""
+
+import math
+
+from kinarm.chain import Chain
+from kinarm.contact_shapes import WITH_HALFSPACE, ContactShapes
+from kinarm.kernels.compiling import Array, inlined, lean_kernel
+from kinarm.kernels.kinematics import forward_kinematics, to_frame, to_world
+from kinarm.kernels.lanes import LANES, any_lane, as_numbers, lane_bits
+from kinarm.kernels.planes import (
+    EVERYDAY,
+    GAP,
+    height_above,
+    is_placed,
+    propose,
+    surface,
+)
+from kinarm.kernels.proof import first_contact, is_apart, prove_alone, twist_step
+from kinarm.kernels.session import Alone, Block
+
+THROUGHOUT = 0
+"""No configurations are tested, but all of the motion."""
+
+
+@lean_kernel
+def sweep(
+    ends: Array,
+    part: int,
+    parts: int,
+    block: Block,
+    alone: Alone,
+    chain: Chain,
+    shapes: ContactShapes,
+    balls: Array,
+) -> int:
+    """Prove parts of a motion free, in turn, a lane for each.
+
+    Parameters
+    ----------
+    ends : ndarray, shape (2, n_joints)
+        Where the motion begins and ends [rad or m].
+    part, parts : int
+        The first part, from 0, and how many equal ones the motion has.
+    block, alone, chain, shapes
+        Work space, the arm, and what may touch.
+    balls : ndarray, shape (n_bodies, 4)
+        Centre and radius of a ball about the corners of each body [m].
+
+    Returns
+    -------
+    int
+        First part that is not proven free, or the number of parts; minus 1 and that part if it
+        surely touches.
+    """
+    q, target = as_numbers(block.q), as_numbers(block.target)
+    while part < parts:
+        for lane in range(LANES):
+            k = min(part + lane, parts - 1)
+            for joint in range(ends.shape[1]):
+                first, second = ends[0, joint], ends[1, joint]
+                q[0, joint, lane] = first + k / parts * (second - first)
+                end = second if k + 1 == parts else first + (k + 1) / parts * (second - first)
+                target[0, joint, lane] = end
+        for joint in range(ends.shape[1]):
+            block.former[0, joint] = 0.5 * (block.q[0, joint] + block.target[0, joint])
+        forward_kinematics(chain, block.former, 0, block.after)
+        for pair in range(shapes.planes.shape[0]):
+            motion = 0.0 * block.q[0, 0]
+            for moved in range(shapes.planes[pair, 2], shapes.planes[pair, 3]):
+                turn = abs(block.target[0, moved] - block.q[0, moved])
+                motion += turn * shapes.travel[moved, pair]
+            block.bound[pair] = between_balls(shapes, balls, pair, block.after) - 0.5 * motion
+        forward_kinematics(chain, block.q, 0, block.before)
+        forward_kinematics(chain, block.target, 0, block.after)
+        twist_step(block)
+        least = 0.0 * block.q[0, 0] + 1.0
+        for pair in range(shapes.planes.shape[0]):
+            far = block.bound[pair]
+            if not any_lane(~is_apart(far)):
+                continue
+            propose(shapes, pair, block.after, block.planes, pair)
+            before = height_above(shapes, pair, EVERYDAY, block.before, block.planes, pair)
+            after = height_above(shapes, pair, EVERYDAY, block.after, block.planes, pair)
+            bend, axis = 0.0 * before, shapes.planes[pair, 2]
+            for moved in range(axis, shapes.planes[pair, 3]):
+                bend += block.twist[axis, moved] * shapes.travel[moved, pair]
+            bound = max(far, min(before, after) - 0.125 * bend)
+            block.height[pair], block.bend[pair], block.bound[pair] = before, bend, bound
+            block.planes[pair, GAP] = after
+            least = min(least, bound)
+        free = lane_bits(is_apart(least))
+        for lane in range(min(LANES, parts - part)):
+            if free >> lane & 1:
+                continue
+            poses = block.before, block.after
+            doubt = prove_alone(lane, chain, shapes, THROUGHOUT, *poses, block, alone)
+            if doubt != 0:
+                known = chain, shapes, THROUGHOUT, block, alone
+                return -1 - part - lane if first_contact(lane, doubt, *known) else part + lane
+        part += LANES
+    return parts
+
+
+@lean_kernel
+def nearest(nodes: Array, count: int, sample: Array, speeds: Array) -> int:
+    """Which of so many configurations reaches a sample soonest, each joint at its speed."""
+    found, least = 0, math.inf
+    for node in range(count):
+        duration = 0.0
+        for joint in range(speeds.shape[0]):
+            duration = max(duration, abs(nodes[node, joint] - sample[joint]) / speeds[joint])
+        if duration < least:
+            found, least = node, duration
+    return found
+
+
+@inlined
+def between_balls(shapes: ContactShapes, balls: Array, pair: int, poses: Array) -> float:
+    """Lower bound of a pair's distance: of a ball from a ball, a box or a half-space [m]."""
+    carrier, mover = shapes.planes[pair, 0], shapes.planes[pair, 1]
+    frame, link = shapes.bodies[carrier, 2], shapes.bodies[mover, 2]
+    x, y, z = to_world(poses, link, balls[mover, 0], balls[mover, 1], balls[mover, 2])
+    around = balls[mover, 3] + shapes.rounding[mover]
+    if shapes.pairs[pair, 0] == WITH_HALFSPACE:
+        nx, ny, nz, offset = surface(poses, frame)
+        return nx * x + ny * y + nz * z - offset - around
+    if is_placed(shapes, frame, poses):
+        x, y, z = to_frame(poses, frame, (x, y, z))
+        low, high = shapes.extents[carrier, 0], shapes.extents[carrier, 1]
+        sx, sy, sz = poses[frame, 0], poses[frame, 1], poses[frame, 2]
+        x -= min(max(x, sx * low[0]), sx * high[0])
+        y -= min(max(y, sy * low[1]), sy * high[1])
+        z -= min(max(z, sz * low[2]), sz * high[2])
+        around += poses[frame, 3]
+    else:
+        u, v, w = to_world(poses, frame, balls[carrier, 0], balls[carrier, 1], balls[carrier, 2])
+        x, y, z, around = x - u, y - v, z - w, around + balls[carrier, 3] + shapes.rounding[carrier]
+    return math.sqrt(x * x + y * y + z * z) - around
