@@ -61,13 +61,23 @@ def activated(xp: Any, name: str, x: Any) -> Any:
 def arm_arrays(contract: Any) -> dict[str, Any]:
     """The arm's joints, and limits of the actuated ones, as arrays."""
     joints, tool = contract["joints"], contract["tool"]
-    names = ("translation", "rotation", "axis", "lower", "upper", "velocity_limit")
-    arm = {name: np.array([each[name] for each in joints]) for name in names}
+    names = ["translation", "rotation", "axis", "lower", "upper", "velocity_limit"]
+    arm = {name: np.array([each[name] for each in joints]) for name in [*names, "sign", "offset"]}
     for name in ("lower", "upper", "velocity_limit"):
         arm[name] = arm[name][: sum(each["actuated"] for each in joints)]
     arm["step"] = arm.pop("velocity_limit") * contract["time_step"]
     arm["slides"] = np.array([1.0 if each["kind"] == "prismatic" else 0.0 for each in joints])
     return {**arm, **{f"tool_{name}": np.array(place) for name, place in tool.items()}}
+
+
+def from_readings(arm: Any, readings: Any) -> Any:
+    """Joint positions of the model, from those that the arm reads."""
+    return (readings - arm["offset"]) * arm["sign"]
+
+
+def to_readings(arm: Any, joints: Any) -> Any:
+    """Joint positions as the arm has them, from those of the model."""
+    return joints * arm["sign"] + arm["offset"]
 
 
 def next_command(xp: Any, arm: Any, commanded: Any, action: Any) -> Any:
@@ -195,13 +205,14 @@ class ArmPolicy:
         Parameters
         ----------
         joint_positions : array_like, shape (n_joints,) or (n, n_joints)
-            Measured positions [rad or m], in the contract's order.
+            Measured positions [rad or m], in the contract's order, signs and offsets.
         goal : array_like, shape (goal_length,) or (n, goal_length)
             Position in the world [m], and what the contract's goals have beside it.
         """
         arm, made, shown = self.arm, self.contract["policy"], self.contract["observation"]
         n, unit = len(arm["step"]), self.contract["resolution"]
-        joints = _checked("joint_positions", joint_positions, len(arm["slides"]))
+        readings = _checked("joint_positions", joint_positions, len(arm["slides"]))
+        joints = from_readings(arm, readings)
         aim = _checked("goal", goal, self.contract["goal"]["length"])
         if self.commanded is None:
             self._begin(joints)
@@ -226,7 +237,7 @@ class ArmPolicy:
         command = np.round(command / unit) * unit if unit else command
         self.commanded = np.concatenate([command, self.commanded[..., n:]], -1)
         self._last, self._steps = joints, self._steps + 1
-        return self.commanded.copy()
+        return to_readings(arm, self.commanded)
 
 
 def _checked(name: str, value: Any, width: int) -> Any:
@@ -249,7 +260,11 @@ def self_test(folder: Any = None) -> list[str]:
     wrong = [] if intact else ["contract.json was changed after the export"]
     for number, vector in enumerate(policy.contract["self_test"]):
         policy.reset()
-        command = policy.command(vector["joint_positions"], vector["goal"])
+        try:
+            command = policy.command(vector["joint_positions"], vector["goal"])
+        except ValueError as refused:
+            wrong.append(f"self-test vector {number}: {refused}")
+            continue
         error = np.abs(command - np.array(vector["command"])).max()
         if not error <= ACCURACY:
             wrong.append(f"command of self-test vector {number} is off by {error:.3g}")

@@ -9,12 +9,15 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 import kinarm
 from kinarm._fields import to_plain
 from kinarm._files import absolute, check_folder, save_archive, shipped_files, write_atomically
+from kinarm.arm import Arm
 from kinarm.clearance import random_configurations
-from kinarm.errors import InvalidInputError, OutputError
+from kinarm.errors import InvalidInputError, OutputError, finite_array
+from kinarm.kernels.compiling import Array
 from kinarm.policies import arm_policy
 from kinarm.policies.conversion.to_torch import command_module, onnx_model
 from kinarm.policies.policy import FORMAT_VERSION, Policy, policy_content
@@ -22,6 +25,9 @@ from kinarm.world import World
 
 WITH_MEMORY = {"joint_velocities", "last_action", "time_left"}
 """Parts of an observation that depend on more than joint positions, command and goal."""
+
+WIRING = ("sign", "offset")
+"""Of a joint in a contract: what the arm reads is sign * position + offset."""
 
 VECTORS = 10
 """Self-test vectors of a folder."""
@@ -43,7 +49,13 @@ FRAMES = (
 
 
 def export_policy(
-    policy: Policy, folder: str | Path, *, overwrite: bool = False, onnx: bool = True
+    policy: Policy,
+    folder: str | Path,
+    *,
+    overwrite: bool = False,
+    onnx: bool = True,
+    sign: ArrayLike | None = None,
+    offset: ArrayLike | None = None,
 ) -> dict[str, Any]:
     """Write a folder that runs a policy on an arm with NumPy alone; return its contract.
 
@@ -57,6 +69,9 @@ def export_policy(
         Replace the files of an earlier one.
     onnx : bool
         Write the policy in ONNX as well, which needs the extra ``export``.
+    sign, offset : array_like, shape (n_joints,), optional
+        What the arm reads of each joint is ``sign``, 1 or -1, times its position in the model, plus
+        ``offset`` [rad or m]; by default 1 and 0.
 
     Raises
     ------
@@ -78,9 +93,9 @@ def export_policy(
         )
     content, packed = policy_content(policy), io.BytesIO()
     save_archive(packed, "policy", FORMAT_VERSION, content.arrays, content.header, compress=True)
-    contract = _contract(policy, world)
+    contract = _contract(policy, world, *_wiring(world.arm, sign, offset))
     contract["policy"]["sha256"] = hashlib.sha256(packed.getvalue()).hexdigest()
-    contract["self_test"] = _self_test(policy, world, contract["resolution"])
+    contract["self_test"] = _self_test(policy, world, contract)
     files = _onnx_files(policy, content.arrays, contract) if onnx else {}
     contract["onnx"] = [*files]
     contract["digest"] = arm_policy.digest_of(contract)
@@ -96,7 +111,16 @@ def export_policy(
     return contract
 
 
-def _contract(policy: Policy, world: World) -> dict[str, Any]:
+def _wiring(arm: Arm, sign: ArrayLike | None, offset: ArrayLike | None) -> tuple[Array, Array]:
+    """Checked signs and offsets of the joints."""
+    shape = (arm.n_joints,)
+    signs = np.ones(shape) if sign is None else finite_array("sign", sign, shape)
+    if (np.abs(signs) != 1.0).any():
+        raise InvalidInputError(f"sign must be 1 or -1 for each joint, got {signs.tolist()}")
+    return signs, np.zeros(shape) if offset is None else finite_array("offset", offset, shape)
+
+
+def _contract(policy: Policy, world: World, sign: Array, offset: Array) -> dict[str, Any]:
     """What somebody who runs the policy has to know, and the runtime reads."""
     problem, arm, layout, made = policy.problem, world.arm, world.layout, policy.provenance
     task, plant, dt, rules = problem.task, problem.plant, problem.stepping.time_step, world.rules
@@ -109,6 +133,9 @@ def _contract(policy: Policy, world: World) -> dict[str, Any]:
         "lower": arm.lower.tolist(),
         "upper": arm.upper.tolist(),
         "velocity_limit": arm.velocity_limits.tolist(),
+        "home": arm.home.tolist(),
+        "sign": sign.tolist(),
+        "offset": offset.tolist(),
         **{each: getattr(arm.chain, each).tolist() for each in ("translation", "rotation", "axis")},
     }
     tool = {"position": arm.chain.tool, "rotation": rules.goal.frame, "axis": rules.goal.axis}
@@ -150,16 +177,20 @@ def _contract(policy: Policy, world: World) -> dict[str, Any]:
     }
 
 
-def _self_test(policy: Policy, world: World, resolution: float) -> list[dict[str, list[float]]]:
+def _self_test(
+    policy: Policy, world: World, contract: dict[str, Any]
+) -> list[dict[str, list[float]]]:
     """Joint positions of arms at rest, goals, and kinarm's commands."""
-    arm, n = world.arm, world.arm.n_actuated
+    arm, n, resolution = world.arm, world.arm.n_actuated, contract["resolution"]
     q, others = (random_configurations(world.contact_model, VECTORS, seed) for seed in (0, 1))
     goals, command = world.reached(others), q.copy()
     moved = q[:, :n] + policy(world.observe(q, goals)) * world.rules.step_limit
     command[:, :n] = np.clip(moved, arm.lower[:n], arm.upper[:n])
     if resolution:
         command[:, :n] = np.round(command[:, :n] / resolution) * resolution
-    columns = {"joint_positions": q, "goal": goals, "command": command}
+    sign, offset = (np.array([each[name] for each in contract["joints"]]) for name in WIRING)
+    readings, told = (sign * joints + offset for joints in (q, command))
+    columns = {"joint_positions": readings, "goal": goals, "command": told}
     return [{name: rows[k].tolist() for name, rows in columns.items()} for k in range(VECTORS)]
 
 
@@ -179,7 +210,8 @@ def _readme(contract: dict[str, Any]) -> str:
     """What whoever receives the folder reads first."""
     rows = [
         f"| {each['name']} | {each['unit']} | {each['lower']:.4g} to {each['upper']:.4g} "
-        f"| {each['velocity_limit']:.4g} | {'yes' if each['actuated'] else 'no'} |"
+        f"| {each['velocity_limit']:.4g} | {'yes' if each['actuated'] else 'no'} "
+        f"| {each['sign']:+.0f} | {each['offset']:.6g} |"
         for each in contract["joints"]
     ]
     text = shipped_files("help", ".txt")["exported"].read_text()

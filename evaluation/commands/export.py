@@ -22,19 +22,32 @@ class ExportRequest(Checked):
         Write it in ONNX as well, which needs the extra export.
     overwrite : bool
         Replace the files of an earlier folder.
+    sign : tuple of float
+        1 or -1 for each joint: whether the arm counts it as the model does.
+    offset : tuple of float
+        What the arm reads of each joint where the model has zero [rad or m].
     """
 
     policy: str = field(metadata={"flag": "policy", "metavar": "POLICY"})
     out: Path = field(metadata={"metavar": "DIR"})
     onnx: bool = True
     overwrite: bool = False
+    sign: tuple[float, ...] = ()
+    offset: tuple[float, ...] = ()
 
 
 def _export(request: ExportRequest, _: str) -> None:
     from kinarm.policies import Policy, export_policy, load_policy
 
     load = Policy.from_sb3 if request.policy.endswith(".zip") else load_policy
-    export_policy(load(request.policy), request.out, overwrite=request.overwrite, onnx=request.onnx)
+    export_policy(
+        load(request.policy),
+        request.out,
+        overwrite=request.overwrite,
+        onnx=request.onnx,
+        sign=request.sign or None,
+        offset=request.offset or None,
+    )
     print(f"written: {request.out}; python {request.out}/arm_policy.py tests it")
 
 

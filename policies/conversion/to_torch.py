@@ -7,7 +7,14 @@ from typing import Any
 
 from kinarm.errors import needed
 from kinarm.networks import Mirror
-from kinarm.policies.arm_policy import arm_arrays, choose_action, next_command, observe
+from kinarm.policies.arm_policy import (
+    arm_arrays,
+    choose_action,
+    from_readings,
+    next_command,
+    observe,
+    to_readings,
+)
 
 OPSET = 17
 """Version of ONNX's operators, from 2022."""
@@ -58,12 +65,14 @@ def command_module(arrays: Mapping[str, Any], contract: Mapping[str, Any]) -> An
     made, n = contract["policy"], sum(each["actuated"] for each in contract["joints"])
     names = [part["name"] for part in contract["observation"]["parts"]]
 
-    def command(xp: Any, held: Any, joints: Any, goal: Any, last: Any) -> Any:
+    def command(xp: Any, held: Any, readings: Any, goal: Any, sent: Any) -> Any:
+        joints, last = from_readings(held, readings), from_readings(held, sent)
         told = xp.concatenate([last[..., :n], joints[..., n:]], -1)
         seen = told if contract["plant"]["feedback"] == "commanded" else joints
         x = observe(xp, held, names, seen, told, goal)
         action = choose_action(xp, held, made["activations"], made["mirror_side"], x)
-        return xp.concatenate([next_command(xp, held, told, action), last[..., n:]], -1)
+        commanded = xp.concatenate([next_command(xp, held, told, action), last[..., n:]], -1)
+        return to_readings(held, commanded)
 
     return module_of({**arrays, **arm_arrays(contract)}, command)
 

@@ -393,6 +393,58 @@ class TestONNX:
         assert (contract["onnx"], contract["observation"]["memory"]) == (["network.onnx"], True)
 
 
+WIRING = {"sign": [1, -1, -1, 1, -1, 1], "offset": [0.3, 0, -1.5, 0, 2, 0.1]}
+
+
+@pytest.fixture(scope="module")
+def wired(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("wired") / "out"
+    export_policy(load_policy("ars-tuned-both"), folder, onnx=False, **WIRING)
+    return folder
+
+
+class TestSignsAndOffsets:
+    """An arm that counts some joints backwards, and from elsewhere."""
+
+    def test_commands_and_self_test(self, wired, exported):
+        assert self_test(wired) == []
+        sign, offset = (np.array(WIRING[name], dtype=float) for name in ("sign", "offset"))
+        plain, theirs, q = ArmPolicy(exported), ArmPolicy(wired), np.full(6, 0.1)
+        for _ in range(5):
+            command = theirs.command(sign * q + offset, [0.4, -0.5, 0.3])
+            q = plain.command(q, [0.4, -0.5, 0.3])
+            np.testing.assert_allclose(command, sign * q + offset, rtol=0, atol=1e-12)
+
+    def test_self_test_notices_a_flipped_sign(self, wired, tmp_path):
+        shutil.copytree(wired, tmp_path / "out")
+        path = tmp_path / "out" / "contract.json"
+        contract = json.loads(path.read_text())
+        contract["joints"][4]["sign"] = 1.0
+        path.write_text(json.dumps(contract))
+        assert len(self_test(tmp_path / "out")) > 1
+
+    def test_onnx(self, wired, tmp_path):
+        for package in ("torch", "onnx"):
+            pytest.importorskip(package)
+        export_policy(load_policy("ars-tuned-both"), tmp_path / "out", **WIRING)
+        theirs = ArmPolicy(wired)
+        vectors = theirs.contract["self_test"]
+        q, goals = (
+            np.array([each[name] for each in vectors]) for name in ("joint_positions", "goal")
+        )
+        inputs = {"joint_positions": q, "goal": goals, "commanded": q}
+        answer = run_onnx(tmp_path / "out" / "policy.onnx", **inputs)
+        np.testing.assert_allclose(answer, theirs.command(q, goals), rtol=0, atol=1e-5)
+
+    @pytest.mark.parametrize(
+        ("wiring", "words"),
+        [({"sign": [1] * 5}, "sign must have shape"), ({"sign": [2] * 6}, "sign must be 1 or -1")],
+    )
+    def test_bad_ones(self, wiring, words, tmp_path):
+        with pytest.raises(InvalidInputError, match=words):
+            export_policy(load_policy("ars-tuned-both"), tmp_path / "out", onnx=False, **wiring)
+
+
 def test_another_version_of_an_arm(tmp_path):
     policy = load_policy("ars-linear-both")
     arm = replace(policy.problem.arm, digest="0" * 16)
