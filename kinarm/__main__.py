@@ -17,6 +17,7 @@ COMMANDS = {
     "replay": ("kinarm.evaluation.commands.replay", "watch what policies do, in a browser"),
     "plan": ("kinarm.evaluation.commands.plan", "plan a motion of an arm that touches nothing"),
     "export": ("kinarm.evaluation.commands.export", "run a policy on an arm, without kinarm"),
+    "run": ("kinarm.evaluation.commands.run", "drive an arm by a policy, with a shield"),
     "study": ("kinarm.evaluation.commands.study", "compare learners and their settings"),
     "problem": ("kinarm.evaluation.commands.problem", "look at problems, and check your own"),
     "arms": ("kinarm.evaluation.commands.arms", "look at arms, and check your own"),

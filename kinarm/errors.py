@@ -8,9 +8,9 @@
     ├── InvalidInputError, which is a ValueError
     │   └── UnknownNameError
     ├── StartInContactError, MissingExtraError
-    └── WorkerError, TrainingFailedError, NoPathError
+    └── WorkerError, TrainingFailedError, NoPathError, RunStoppedError
 
-Command lines turn them into one line on standard error and exit status 2, or 1 for the last three,
+Command lines turn them into one line on standard error and exit status 2, or 1 for the last four,
 failures of a run.
 """
 
@@ -169,6 +169,12 @@ class NoPathError(KinarmError):
         self.samples = samples
         many = "1 sample" if samples == 1 else f"{samples} samples"
         super().__init__(f"no path found with {many}: there may be none")
+
+
+class RunStoppedError(KinarmError):
+    """A run on an arm was stopped, or the arm does not answer."""
+
+    exit_status = 1
 
 
 class MissingExtraError(KinarmError):

@@ -17,13 +17,13 @@ import gymnasium
 import numpy as np
 from numpy.typing import NDArray
 
-from docs.measurements.mjcf import mjcf
 from docs.measurements.self_contact import of_hulls
 from docs.measurements.turns import alternated
 from kinarm.envs import ReachVectorEnv
 from kinarm.evaluation.bench import VECTOR_ENVS
 from kinarm.evaluation.report.templating import markdown_table
 from kinarm.evaluation.trials import TrialSet
+from kinarm.mjcf import mjcf
 from kinarm.policies import Policy, load_policy, recipe, train_policy
 from kinarm.policies.learners import find_learner, state_policy
 from kinarm.policies.sb3.environment import sb3_vec_env

@@ -14,8 +14,8 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from docs.measurements.mjcf import mjcf
 from kinarm import Plant, Simulator
+from kinarm.mjcf import mjcf
 from kinarm.policies import Policy, load_policy
 
 Array = NDArray[np.float64]

@@ -11,10 +11,10 @@ from numba import njit
 
 from docs.measurements import motionbenchmaker
 from docs.measurements.counting import OperationCounter
-from docs.measurements.mjcf import mjcf
 from kinarm.arm import Arm
 from kinarm.kernels.lanes import LANES, as_lanes
 from kinarm.kernels.network import affine_layer
+from kinarm.mjcf import mjcf
 from kinarm.policies import load_policy
 from kinarm.problem import PROBLEMS
 from kinarm.world import World

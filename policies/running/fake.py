@@ -1,0 +1,114 @@
+"""A fake arm, which obeys as a plant does."""
+
+import sys
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import numpy as np
+
+from kinarm.episodes import RUNNING
+from kinarm.goals import GoalSpecification
+from kinarm.kernels.compiling import Array
+from kinarm.kernels.plant import COMMAND
+from kinarm.observation_choice import Observation
+from kinarm.plant import Plant, PlantLike
+from kinarm.policies.arm_policy import from_readings, to_readings
+from kinarm.policies.running.backend import SimulatedTime
+from kinarm.simulator import Simulator
+from kinarm.task import LONGEST_HORIZON
+from kinarm.world import World
+
+FAR = 1e3
+"""Distance of what is no goal [m]."""
+
+Distortion = Callable[[Array], Array]
+"""From joint positions to other ones, shape (n_joints,) [rad or m]."""
+
+
+def unchanged(positions: Array) -> Array:
+    """The same positions."""
+    return positions
+
+
+class FakeArm(SimulatedTime):
+    """An arm that lags as a plant does, and stops before it touches something.
+
+    Parameters
+    ----------
+    world : World
+        Arm and scene.
+    start : ndarray, shape (n_joints,)
+        Where it rests [rad or m].
+    plant : Plant, str or Path
+        What lies between command and joint; each period is a step of it.
+    wiring : mapping, optional
+        ``sign`` and ``offset`` of each joint, by which it counts.
+    reads, takes : callable
+        What becomes of its readings and commands: errors on purpose.
+    """
+
+    rate: float | None = None
+
+    def __init__(
+        self,
+        world: World,
+        start: Array,
+        *,
+        plant: PlantLike = "ideal",
+        wiring: Mapping[str, Any] | None = None,
+        reads: Distortion = unchanged,
+        takes: Distortion = unchanged,
+    ) -> None:
+        super().__init__()
+        self.joint_names = world.arm.joint_names
+        n = len(self.joint_names)
+        self.start, self.reads, self.takes = np.array(start, dtype=float), reads, takes
+        self._wiring = {"sign": np.ones(n), "offset": np.zeros(n)} if wiring is None else wiring
+        self._problem, self._plant = world.problem, Plant.load(plant)
+        self._simulator: Simulator | None = None
+
+    def connect(self, period: float) -> None:
+        """Rest at the start."""
+        if self._simulator is None or period != self.period:
+            problem = self._problem.replace(
+                plant=self._plant,
+                feedback="measured",
+                shield=False,
+                time_step=period,
+                horizon=LONGEST_HORIZON,
+                tolerance=sys.float_info.min,
+                goal=GoalSpecification(),
+                observation=Observation(),
+            )
+            self._simulator, self.period = Simulator(problem, threads=1), period
+        goal = self._simulator.world.reached(self.start[None]) + FAR
+        self._episodes = self._simulator.reset(self.start[None], goal)
+        self._told = self.start
+
+    def read(self) -> Array:
+        """Where sensors have the joints."""
+        seen = self._episodes.sensed if len(self._episodes.sensed) else self._episodes.q
+        return self.reads(np.asarray(to_readings(self._wiring, seen[0])))
+
+    def command(self, positions: Array) -> None:
+        """Send the joints to positions, as fast as they can."""
+        self._told = np.asarray(from_readings(self._wiring, self.takes(positions)))
+
+    def advance(self) -> None:
+        """Move on by a step of the plant."""
+        assert self._simulator is not None
+        episodes, n = self._episodes, self._simulator.n_actions
+        last = episodes.drive[0, COMMAND] if len(episodes.drive) else episodes.q[0, :n]
+        action = (self._told[:n] - last) / self._simulator.step_limit
+        self._simulator.step(episodes, action[None])
+        if episodes.status[0] != RUNNING:
+            (pair,) = self._simulator.world.contact_pairs(episodes.target)
+            touch = " touches ".join(pair or ("it", "something"))
+            raise ConnectionError(f"the arm stopped, for {touch}")
+
+    def stop(self) -> None:
+        """Rest where the joints are."""
+        self._told = self._episodes.q[0].copy()
+
+    def close(self) -> None:
+        """Nothing is left open."""

@@ -1,0 +1,283 @@
+"""Runs on fake arms: commands are the simulator's motion; what goes wrong stops them at rest."""
+
+import numpy as np
+import pytest
+
+from kinarm import Plant, Simulator
+from kinarm.errors import (
+    InvalidInputError,
+    PolicyFileError,
+    ProblemError,
+    RunStoppedError,
+    StartInContactError,
+)
+from kinarm.policies import export_policy, load_policy
+from kinarm.policies.running.backend import WiredArm
+from kinarm.policies.running.contract import load_wiring
+from kinarm.policies.running.fake import FakeArm, unchanged
+from kinarm.policies.running.run import Run, RunSettings, drawn_goals
+from kinarm.policies.running.watchdog import SafeLimits
+from kinarm.recording import load_recordings, save_recordings
+
+WIRING = {"sign": np.array([1, -1, 1, 1, -1, 1.0]), "offset": np.array([0.5, 0, -1, 0, 0.2, 0])}
+LAG = {"bandwidth": 8.0, "delay": 1}
+
+
+@pytest.fixture(scope="module")
+def policy():
+    return load_policy("ppo-best-both")
+
+
+@pytest.fixture(scope="module")
+def simulator():
+    return Simulator("both", threads=1).shielded()
+
+
+@pytest.fixture(scope="module")
+def trial(simulator):
+    return drawn_goals(simulator, 3, 0)
+
+
+@pytest.fixture
+def make(policy, simulator, trial):
+    """A run on a fake arm."""
+
+    def made(*, world=None, start=None, wiring=None, settings=None, **arm):
+        fake = FakeArm(simulator.world, trial[0] if start is None else start, wiring=wiring, **arm)
+        wired = WiredArm(fake, world or simulator.world, wiring)
+        return Run(wired, policy, simulator, RunSettings(**(settings or {})))
+
+    return made
+
+
+class Told:
+    """Keeps commands, and may do something at one of them."""
+
+    def __init__(self, at=-1, then=None):
+        self.positions, self.at, self.then = [], at, then
+
+    def __call__(self, positions):
+        if len(self.positions) == self.at:
+            self.then()
+        self.positions.append(positions.copy())
+        return positions
+
+
+def raising(error):
+    def fail():
+        raise error
+
+    return fail
+
+
+def at_rest(arm):
+    """Whether joints stay where they are."""
+    arm.reads = unchanged
+    arm.wait(arm.now() + 1.0)
+    before = arm.read()
+    arm.wait(arm.now() + 1.0)
+    return np.abs(arm.read() - before).max() < 1e-3
+
+
+class TestMotion:
+    @pytest.mark.parametrize("speed", [1.0, 0.2, 0.3])
+    def test_commands_are_the_simulators_steps(self, make, policy, simulator, trial, speed):
+        start, goals = trial
+        told = Told()
+        run = make(settings={"speed": speed}, takes=told)
+        (attempt,) = run.to_goals(goals[:1])
+        rollout = simulator.rollout(policy, start[None], goals[:1], record=True)
+        path = rollout.paths[0, : rollout.steps[0] + 1]
+        steps = np.array(told.positions)[: run.parts * len(path[1:])]
+        np.testing.assert_allclose(steps[run.parts - 1 :: run.parts], path[1:], rtol=0, atol=1e-12)
+        moves = np.diff(np.vstack([start, steps]), axis=0)
+        fastest = speed * simulator.arm.velocity_limits * run.arm.period
+        assert (np.abs(moves) <= fastest + 1e-12).all()
+        assert attempt.reached
+        assert len(attempt.recording.states) == len(path)
+
+    def test_signs_and_offsets(self, make, trial):
+        plain, wired = Told(), Told()
+        make(takes=plain).to_goals(trial[1])
+        make(takes=wired, wiring=WIRING).to_goals(trial[1])
+        expected = np.array(plain.positions) * WIRING["sign"] + WIRING["offset"]
+        np.testing.assert_allclose(np.array(wired.positions), expected, rtol=0, atol=1e-12)
+
+    @pytest.mark.parametrize("feedback", ["commanded", "measured"])
+    def test_an_arm_that_lags(self, make, trial, feedback):
+        settings = {"feedback": feedback, "speed": 0.5}
+        attempts = make(plant=Plant(**LAG, noise=1e-4), settings=settings).to_goals(trial[1])
+        assert [attempt.reached for attempt in attempts] == [True] * 3
+
+    def test_recordings(self, make, trial, tmp_path):
+        attempts = make().to_goals(trial[1])
+        save_recordings(tmp_path / "run.npz", [each.recording for each in attempts])
+        kept = load_recordings(tmp_path / "run.npz")
+        assert [each.outcome for each in kept] == ["success"] * 3
+        assert kept[1].same_trial(attempts[1].recording)
+        np.testing.assert_allclose(kept[1].states[0], kept[0].states[-1], rtol=0, atol=1e-9)
+
+    def test_shield_keeps_from_contact(self, policy, simulator):
+        """A policy that runs into itself or a bench is stopped, or led around."""
+        bare, rng = simulator.shielded(False), np.random.default_rng(5)
+        starts, goals = bare.sample(rng, 2000)
+        touching = np.flatnonzero(bare.rollout(policy, starts, goals).collision)
+        assert len(touching)
+        k = touching[0]
+        for world, outcome in ((bare, "collision"), (simulator, "success")):
+            fake = FakeArm(simulator.world, starts[k])
+            run = Run(WiredArm(fake, world.world), policy, world, RunSettings())
+            (attempt,) = run.to_goals(goals[k : k + 1])
+            assert attempt.recording.outcome == outcome
+            assert (attempt.interventions > 0) == (outcome == "success")
+
+
+class TestStops:
+    """Each stops at rest, with a line and what was recorded."""
+
+    def check(self, run, goals, words):
+        with pytest.raises(RunStoppedError, match=words):
+            run.to_goals(goals)
+        assert len(run.attempts) == 1
+        assert run.attempts[0].recording.outcome == "truncated"
+        assert at_rest(run.arm.backend)
+
+    def test_lost_connection(self, make, trial):
+        told = Told(20, raising(ConnectionError("cable")))
+        self.check(make(takes=told), trial[1], "lost the arm: cable")
+
+    def test_blocked_joint(self, make, trial):
+        def blocked(positions):
+            return np.where(np.arange(6) == 1, trial[0], positions)
+
+        run = make(takes=blocked, settings={"speed": 1.0})
+        self.check(run, trial[1], "axis_2 is .* from its command; at most 0.3 is allowed")
+
+    def test_stale_readings(self, make, trial):
+        kept = []
+
+        def frozen(positions):
+            kept.append(positions)
+            return kept[min(len(kept) - 1, 12)]
+
+        run = make(reads=frozen, settings={"watchdog": SafeLimits(distance=10.0)})
+        self.check(run, trial[1], "readings have not changed")
+
+    def test_no_numbers(self, make, trial):
+        told = []
+
+        def broken(positions):
+            told.append(positions)
+            return positions * (np.nan if len(told) > 10 else 1)
+
+        self.check(make(reads=broken), trial[1], "lost the arm: it reads")
+
+    def test_late_cycles(self, make, trial):
+        run = make(takes=(told := Told()))
+        told.at, told.then = 10, lambda: setattr(told, "slow", True)
+
+        def slow(positions):
+            if hasattr(told, "slow"):
+                run.arm.backend.time += 0.03
+            return positions
+
+        run.arm.backend.reads = slow
+        self.check(run, trial[1], "3 cycles in a row were late")
+
+    def test_too_fast(self, make, trial):
+        """Somebody pushes a joint."""
+        pushed = []
+
+        def push(positions):
+            pushed.append(positions)
+            return positions + (np.arange(6) == 0) * 0.3 * max(len(pushed) - 20, 0)
+
+        run = make(reads=push, settings={"watchdog": SafeLimits(distance=10.0)})
+        self.check(run, trial[1], "axis_1 is .* too fast")
+
+    def test_too_abrupt(self, make, trial):
+        run = make(settings={"speed": 1.0, "watchdog": SafeLimits(acceleration=1.0)})
+        self.check(run, trial[1], "too abrupt")
+
+    def test_contact_of_the_arm(self, make, trial):
+        """The shield does not know what a lagging arm cuts through."""
+        run = make(takes=Told(10, raising(ConnectionError("the arm stopped, for a touches b"))))
+        self.check(run, trial[1], "a touches b")
+
+    def test_ctrl_c(self, make, trial):
+        run = make(takes=Told(31, raising(KeyboardInterrupt())))
+        with pytest.raises(KeyboardInterrupt):
+            run.to_goals(trial[1])
+        (attempt,) = run.attempts
+        assert attempt.ended == "interrupted"
+        assert attempt.recording.steps > 5
+        assert at_rest(run.arm.backend)
+
+
+class TestRefusals:
+    """Nothing moves."""
+
+    def check(self, run, goals, kind, words):
+        run.arm.backend.takes = raising(AssertionError)
+        with pytest.raises(kind, match=words):
+            run.to_goals(goals)
+
+    def test_goal_out_of_reach(self, make):
+        self.check(make(), np.array([[2.0, 0, 0.5]]), InvalidInputError, "out of reach")
+
+    def test_start_in_contact(self, make, simulator, trial):
+        rng, arm = np.random.default_rng(0), simulator.arm
+        q = rng.uniform(arm.lower, arm.upper, (200, 6))
+        touching = q[simulator.world.in_contact(q)][0]
+        run = make()
+        run.arm.backend.reads = lambda positions: touching
+        self.check(run, trial[1], StartInContactError, "touches")
+
+    def test_start_beyond_the_limits(self, make, trial):
+        run = make(reads=np.rad2deg)
+        self.check(run, trial[1], InvalidInputError, "axis_.* reads .* its limits are")
+
+    def test_rate_that_the_machine_cannot_keep(self, make, trial):
+        run = make(settings={"rate": 1e6})
+        self.check(run, trial[1], InvalidInputError, "a cycle takes .* 1e\\+06 Hz leaves")
+
+    def test_contract_of_another_arm(self, policy, simulator, make):
+        other = Simulator(simulator.problem.replace(arm="lrmate200ic_5l"), threads=1)
+        with pytest.raises(PolicyFileError, match="trained for arm 'paper'"):
+            Run(make().arm, policy, other, RunSettings())
+
+    def test_arm_with_other_joints(self, simulator):
+        fake = FakeArm(simulator.world, simulator.arm.home)
+        fake.joint_names = ("a", "b")
+        with pytest.raises(InvalidInputError, match="the backend has the joints a, b, arm 'paper'"):
+            WiredArm(fake, simulator.world)
+
+    def test_no_connection(self, make, trial, monkeypatch):
+        monkeypatch.setattr(FakeArm, "connect", lambda *_: raising(OSError("no route"))())
+        self.check(make(), trial[1], RunStoppedError, "no connection to the arm: no route")
+
+    def test_bodies_that_are_not_known(self, make, policy, simulator):
+        moved = Simulator(simulator.problem, threads=1)
+        moved.world.has_random_bodies = True
+        with pytest.raises(ProblemError, match="random or move"):
+            Run(make().arm, policy, moved, RunSettings())
+
+    def test_memory_of_measurements(self, make, policy, simulator):
+        other = Simulator(simulator.problem.replace(observation={"history": 2}), threads=1)
+        with pytest.raises(InvalidInputError, match="sees history takes the commanded"):
+            Run(make().arm, policy, other, RunSettings(feedback="measured"))
+
+    def test_speed(self):
+        with pytest.raises(InvalidInputError, match="speed must be at most 1"):
+            RunSettings(speed=1.5)
+
+    def test_changed_folder(self, policy, tmp_path):
+        export_policy(policy, tmp_path / "out", onnx=False)
+        assert load_wiring(tmp_path / "out")["sign"].tolist() == [1.0] * 6
+        path = tmp_path / "out" / "contract.json"
+        path.write_text(path.read_text().replace('"sign": 1.0', '"sign": -1.0', 1))
+        with pytest.raises(PolicyFileError, match="fails its self-test: contract"):
+            load_wiring(tmp_path / "out")
+        path.write_text("{")
+        with pytest.raises(PolicyFileError, match="is no exported folder"):
+            load_wiring(tmp_path / "out")
