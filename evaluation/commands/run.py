@@ -171,49 +171,55 @@ def _drive(request: RunRequest, _: str) -> None:
     """Run a policy; print how each goal went, and keep what was recorded."""
     import numpy as np
 
-    from kinarm.policies.running.run import Run, RunSettings, drawn_goals
+    from kinarm.policies.running.run import Run
 
     if request.record is not None:
         check_output(request.record, overwrite=request.overwrite, suffix=".npz")
     policy, simulator, wiring = request.faced()
-    start, goals = drawn_goals(simulator, request.trials, request.seed)
+    starts, goals = simulator.sample(np.random.default_rng(request.seed), request.trials)
     if request.goal:
         width = simulator.world.goal_width
         if len(request.goal) % width:
             raise InvalidInputError(f"a goal is {width} numbers, got {len(request.goal)}")
         goals = np.reshape(request.goal, (-1, width))
-    settings = RunSettings(
+    run = Run(
+        request.arm_of(simulator, wiring, starts[0]),
+        policy,
+        simulator,
         speed=request.speed,
         rate=request.rate,
-        feedback=request.feedback or "commanded",
-        watchdog=request.watchdog,
+        measured=request.feedback == "measured",
+        limits=request.watchdog,
+        name=Path(request.policy).stem,
     )
-    arm = request.arm_of(simulator, wiring, start)
-    run = Run(arm, policy, simulator, settings, name=Path(request.policy).stem)
     try:
         with telling(lambda: "interrupted; the arm rests"):
             run.to_goals(goals)
     finally:
-        _report(request, run)
+        _report(request.record, run)
 
 
-def _report(request: RunRequest, run: "Run") -> None:
+def _report(out: Path | None, run: "Run") -> None:
     """Print what was done, and keep it."""
-    from kinarm.policies.running.run import latency_summary
+    import numpy as np
+
     from kinarm.recording import save_recordings
 
-    for number, attempt in enumerate(run.attempts, 1):
-        made = attempt.recording
-        place = ", ".join(f"{value:.3f}" for value in made.goal)
+    for each in run.recordings:
+        place = ", ".join(f"{value:.3f}" for value in each.goal)
         print(
-            f"goal {number} ({place}): {attempt.ended}, {made.final_distance:.3f} m from it after "
-            f"{made.steps} steps, {attempt.interventions} replaced"
+            f"goal {each.trial + 1} ({place}): {each.provenance['ended']}, {each.final_distance:.3f}"
+            f" m from it after {each.steps} steps, {each.provenance['interventions']} replaced"
         )
-    if run.attempts:
-        print(f"{latency_summary(run.attempts)}, at {run.rate:g} Hz, {run.parts} a step")
-    if run.attempts and request.record is not None:
-        save_recordings(request.record, [attempt.recording for attempt in run.attempts])
-        print(f"written: {request.record}; kinarm-replay {request.record} shows it")
+    if run.latencies:
+        half, most = (1e3 * np.percentile(run.latencies, share) for share in (50, 99))
+        print(
+            f"{len(run.latencies)} cycles at {run.rate:g} Hz, {run.parts} a step: {half:.2g} ms in "
+            f"the median, {most:.2g} ms at the 99th percentile"
+        )
+    if run.recordings and out is not None:
+        save_recordings(out, run.recordings)
+        print(f"written: {out}; kinarm-replay {out} shows it")
 
 
 def _check(request: CheckRequest, _: str) -> None:

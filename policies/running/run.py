@@ -1,18 +1,14 @@
 """Runs: a policy drives an arm to goals, behind a shield and a watchdog."""
 
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass, field
 from time import perf_counter
-from typing import Literal
 
 import numpy as np
+from numpy.typing import ArrayLike
 
-from kinarm._fields import Checked
 from kinarm.episodes import COLLISION, RUNNING, SUCCESS, Episodes, Outcome
-from kinarm.errors import POSITIVE, InvalidInputError, ProblemError, RunStoppedError
+from kinarm.errors import InvalidInputError, ProblemError, RunStoppedError
 from kinarm.kernels.compiling import Array
-from kinarm.observation_layout import ObservationLayout
 from kinarm.policies.export import WITH_MEMORY
 from kinarm.policies.policy import Policy
 from kinarm.policies.running.backend import WiredArm
@@ -20,70 +16,15 @@ from kinarm.policies.running.watchdog import SafeLimits, Watchdog
 from kinarm.recording import Recording
 from kinarm.simulator import Simulator
 
-REST = 1e-3
-"""Way in `SETTLED` seconds below which a joint rests [rad or m]."""
-
-SETTLED, LONGEST_REST = 0.1, 2.0
-"""Time in which an arm is seen to rest, and at most waited for it [s]."""
+REST, SETTLED, LONGEST_REST = 1e-3, 0.1, 2.0
+"""An arm rests if joints move less [rad or m] in such a time [s]; how long it is waited for [s]."""
 
 REHEARSED = 30
 """Steps that are timed before the arm moves."""
 
 
-@dataclass(frozen=True, kw_only=True)
-class RunSettings(Checked):
-    """How a policy drives an arm.
-
-    Parameters
-    ----------
-    speed : float
-        Share of the speed of its training, at most 1: steps take longer.
-    rate : float, optional
-        Commands per second [Hz]; by default what the arm wants, or the policy's.
-    feedback : {"commanded", "measured"}
-        Which joint positions the policy sees.
-    watchdog : SafeLimits
-        What stops the run.
-    """
-
-    speed: float = field(default=0.2, metadata=POSITIVE)
-    rate: float | None = field(default=None, metadata=POSITIVE)
-    feedback: Literal["commanded", "measured"] = "commanded"
-    watchdog: SafeLimits = field(default_factory=SafeLimits)
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        if self.speed > 1.0:
-            raise InvalidInputError(f"speed must be at most 1, got {self.speed:g}")
-
-
-@dataclass(frozen=True, eq=False)
-class Attempt:
-    """What a run did for one goal.
-
-    Attributes
-    ----------
-    recording : Recording
-        Measured configurations, a step apart.
-    reached : bool
-        Whether the resting arm was at the goal.
-    ended : str
-        Why it ended, in words.
-    latencies : ndarray, shape (cycles,)
-        Times from before reading to after commanding [s].
-    interventions : int
-        Steps that the shield replaced.
-    """
-
-    recording: Recording
-    reached: bool
-    ended: str
-    latencies: Array
-    interventions: int
-
-
 class Run:
-    """A policy on an arm: commands are the motion of an episode that obeys at once.
+    """A policy on an arm: commands are the motion of an episode whose joints obey at once.
 
     Each step of the policy is commanded as a straight motion of whole cycles, so that it is the one
     which the shield has proven free.
@@ -95,9 +36,15 @@ class Run:
     policy : Policy
         What drives it.
     simulator : Simulator
-        Arm and scene, as the shield knows them; with a shield, if there is to be one.
-    settings : RunSettings
-        Speed, rate, feedback and watchdog.
+        Arm and scene as the shield knows them; `Simulator.shielded` for one with a shield.
+    speed : float
+        Share of the speed of its training, at most 1: steps take longer.
+    rate : float, optional
+        Commands per second [Hz]; by default what the arm wants, or one a step at full speed.
+    measured : bool
+        The policy sees measured joint positions, not those that were commanded.
+    limits : SafeLimits, optional
+        What stops the run.
     name : str
         What recordings call the policy.
 
@@ -105,13 +52,15 @@ class Run:
     ----------
     rate, parts : float and int
         Cycles per second [Hz], and cycles of a step.
-    attempts : list of Attempt
-        What has been done, a goal each; also of a goal at which the run was stopped.
+    recordings : list of Recording
+        Measured configurations for each goal, also for one at which the run was stopped.
+    latencies : list of float
+        From before reading to after commanding, in each cycle [s].
 
     Raises
     ------
     KinarmError
-        If arm, scene or feedback do not suit a run.
+        If policy, scene or a setting do not suit a run.
     """
 
     def __init__(
@@ -119,23 +68,31 @@ class Run:
         arm: WiredArm,
         policy: Policy,
         simulator: Simulator,
-        settings: RunSettings,
+        *,
+        speed: float = 0.2,
+        rate: float | None = None,
+        measured: bool = False,
+        limits: SafeLimits | None = None,
         name: str = "policy",
     ) -> None:
         policy.check_arm(simulator.arm)
         world, time_step = simulator.world, simulator.problem.stepping.time_step
         if world.has_random_bodies or len(world.contact_model.shapes.moving):
-            raise ProblemError("bodies that are random or move are not known in a run")
-        if settings.feedback == "measured":
-            _check_no_memory(world.layout)
-        self.arm, self.policy, self.settings, self.name = arm, policy, settings, name
-        self.simulator = simulator.with_plant("ideal")
-        self.rate = settings.rate or arm.backend.rate or 1.0 / time_step
-        self.parts = max(1, math.ceil(self.rate * time_step / settings.speed - 1e-9))
-        self.attempts: list[Attempt] = []
-        self._period, self._told = 1.0 / self.rate, np.zeros(0)
+            raise ProblemError("a run does not know where bodies are that are random or move")
+        if not 0.0 < speed <= 1.0:
+            raise InvalidInputError(f"speed must lie in (0, 1], got {speed:g}")
+        held = {"commanded", *WITH_MEMORY}.intersection(world.layout.places) - {"time_left"}
+        if measured and (held or world.layout.history > 1):
+            seen = ", ".join(sorted(held)) or "a history"
+            raise InvalidInputError(f"a policy that sees {seen} takes commanded feedback in a run")
+        self.arm, self.policy, self.measured, self.name = arm, policy, measured, name
+        self.simulator, self.speed = simulator.with_plant("ideal"), speed
+        self.rate = rate or arm.backend.rate or 1.0 / time_step
+        self.parts = max(1, math.ceil(self.rate * time_step / speed - 1e-9))
+        self.recordings, self.latencies = list[Recording](), list[float]()
+        self._limits, self._told = limits or SafeLimits(), np.zeros(0)
 
-    def to_goals(self, goals: Array) -> list[Attempt]:
+    def to_goals(self, goals: ArrayLike) -> list[Recording]:
         """Bring the arm to goals, shape (n, goal_width), one after the other.
 
         Raises
@@ -147,14 +104,15 @@ class Run:
         RunStoppedError
             If the watchdog stops it, or the arm does not answer.
         """
-        self._check_goals(goals)
+        aims = np.array(goals, dtype=float)
+        self._check_goals(aims)
         with self.arm.connected(self.rate) as arm:
             self._told = self._within(arm.read())
-            self._rehearse(goals[0])
-            for goal in goals:
+            self._rehearse(aims[0])
+            for goal in aims:
                 self._reach(goal)
             arm.stop()
-        return self.attempts
+        return self.recordings
 
     def _check_goals(self, goals: Array) -> None:
         world = self.simulator.world
@@ -164,73 +122,72 @@ class Run:
             goal = goals[int(found.argmin())].tolist()
             raise InvalidInputError(f"the goal {goal} is out of reach, or all around it touches")
 
-    def _rehearse(self, goal: Array) -> None:
-        """Refuse a start in contact, and a rate that this machine cannot keep."""
-        times, episodes = [], self._episode(self._told, goal)
-        for _ in range(REHEARSED):
-            if episodes.status[0] != RUNNING:
-                episodes = self._episode(self._told, goal)
-            began = perf_counter()
-            self._step(episodes, self._told)
-            times.append(perf_counter() - began)
-        if (needed := float(np.median(times))) > self._period:
-            raise InvalidInputError(
-                f"a cycle takes {1e3 * needed:.2g} ms here, and a rate of {self.rate:g} Hz leaves "
-                f"{1e3 * self._period:.2g} ms"
-            )
-
     def _within(self, reading: Array) -> Array:
         """A reading within the limits, which it may miss by a step."""
-        arm, chain = self.simulator.arm, self.simulator.arm.chain
-        within = np.clip(reading, chain.lower, chain.upper)
+        arm = self.simulator.arm
+        within = np.clip(reading, arm.lower, arm.upper)
         limit = arm.velocity_limits * self.simulator.problem.stepping.time_step
         if (beyond := np.abs(reading - within) > limit).any():
             joint = int(beyond.argmax())
             raise InvalidInputError(
                 f"{arm.joint_names[joint]} reads {reading[joint]:.6g}, and its limits are "
-                f"{chain.lower[joint]:.6g} and {chain.upper[joint]:.6g}"
+                f"{arm.lower[joint]:.6g} and {arm.upper[joint]:.6g}"
             )
         return within
 
-    def _episode(self, start: Array, goal: Array) -> Episodes:
-        return self.simulator.reset(start[None], goal[None])
+    def _rehearse(self, goal: Array) -> None:
+        """Refuse a start in contact, and a rate that this machine cannot keep."""
+        times, episodes, period = [], self._episode(goal), 1.0 / self.rate
+        for _ in range(REHEARSED):
+            if episodes.status[0] != RUNNING:
+                episodes = self._episode(goal)
+            began = perf_counter()
+            self._step(episodes, self._told)
+            times.append(perf_counter() - began)
+        if (needed := float(np.median(times))) > period:
+            raise InvalidInputError(
+                f"a cycle takes {1e3 * needed:.2g} ms here, and a rate of {self.rate:g} Hz leaves "
+                f"{1e3 * period:.2g} ms"
+            )
+
+    def _episode(self, goal: Array) -> Episodes:
+        return self.simulator.reset(self._told[None], goal[None])
 
     def _step(self, episodes: Episodes, reading: Array) -> Array:
         """Let the policy act; where the step leads, shape (n_joints,) [rad or m]."""
         seen = episodes.observation
-        if self.settings.feedback == "measured":
-            seen = self.simulator.world.observe(
-                reading[None], episodes.goal, int(episodes.steps[0])
-            )
+        if self.measured:
+            step = int(episodes.steps[0])
+            seen = self.simulator.world.observe(reading[None], episodes.goal, step)
         self.simulator.step(episodes, self.policy(seen))
         return np.array(episodes.q[0])
 
     def _reach(self, goal: Array) -> None:
-        """Follow the policy until its episode ends, and rest there."""
-        episodes, log = self._episode(self._told, goal), _Log()
+        """Follow the policy until its episode ends, rest there, and record what joints did."""
+        episodes, states, aims, stopped = self._episode(goal), list[Array](), list[Array](), ""
         try:
-            self._follow(episodes, log)
-            log.states.append(self._settle())
-            log.aims.append(episodes.goal[0].copy())
-        except RunStoppedError as stopped:
+            self._follow(episodes, states, aims)
+            states.append(self._settled())
+        except RunStoppedError as error:
+            stopped = str(error)
             self.arm.stop()
-            log.stopped = str(stopped)
             raise
         except KeyboardInterrupt:
-            log.stopped = "interrupted"
-            log.states.append(self._settle())
-            log.aims.append(episodes.goal[0].copy())
+            stopped = "interrupted"
+            states.append(self._settled())
             self.arm.stop()
             raise
         finally:
-            self.attempts.append(self._attempt(goal, episodes, log))
+            aims = [*aims, episodes.goal[0].copy()][: len(states)]
+            path = np.array(states or [self._told])
+            self.recordings.append(self._recording(goal, episodes, path, np.array(aims), stopped))
 
-    def _follow(self, episodes: Episodes, log: "_Log") -> None:
+    def _follow(self, episodes: Episodes, states: list[Array], aims: list[Array]) -> None:
         """Read, observe, act, shield, and command, a cycle after the other."""
-        arm, chain, late = self.arm, self.simulator.arm, 0.0
-        fastest = chain.velocity_limits * self.settings.speed
-        names, period = chain.joint_names, self._period
-        watchdog, due = Watchdog(self.settings.watchdog, names, fastest, period), arm.now()
+        arm, model, period, late = self.arm, self.simulator.arm, 1.0 / self.rate, 0.0
+        fastest = self.speed * model.velocity_limits
+        watchdog = Watchdog(self._limits, model.joint_names, fastest, period)
+        due, target = arm.now(), self._told
         while episodes.status[0] == RUNNING:
             origin = self._told
             for part in range(1, self.parts + 1):
@@ -238,58 +195,52 @@ class Run:
                 reading = arm.read()
                 watchdog.check(reading, self._told, late)
                 if part == 1:
-                    log.states.append(reading)
-                    log.aims.append(episodes.goal[0].copy())
+                    states.append(reading)
+                    aims.append(episodes.goal[0].copy())
                     target = self._step(episodes, reading)
                 share = part / self.parts
-                self._told = target if part == self.parts else origin + share * (target - origin)
+                self._told = target if share == 1.0 else origin + share * (target - origin)
                 arm.command(self._told)
-                log.latencies.append(perf_counter() - began)
+                self.latencies.append(perf_counter() - began)
                 late = arm.now() - due
                 arm.wait(due)
                 due = max(due, arm.now())
 
-    def _settle(self) -> Array:
+    def _settled(self) -> Array:
         """Hold the last command until the joints rest; where they do."""
         arm, before = self.arm, self.arm.read()
-        cycles = max(1, round(SETTLED * self.rate))
         for _ in range(round(LONGEST_REST / SETTLED)):
-            for _ in range(cycles):
+            for _ in range(max(1, round(SETTLED * self.rate))):
                 arm.command(self._told)
-                arm.wait(arm.now() + self._period)
+                arm.wait(arm.now() + 1.0 / self.rate)
             reading = arm.read()
             if np.abs(reading - before).max() < REST:
                 return reading
             before = reading
         return before
 
-    def _attempt(self, goal: Array, episodes: Episodes, log: "_Log") -> Attempt:
-        """What was done for a goal, by the measured configurations."""
-        world, status = self.simulator.world, int(episodes.status[0])
-        states = np.array(log.states or [self._told])
-        aims = np.array(log.aims or [goal])[: len(states)]
-        states = states[: len(aims)]
-        distances, turns = world.distances(states, aims), world.turns(states[-1:], aims[-1:])
-        task, contact = self.simulator.task, None
-        at_goal = distances[-1] <= task.tolerance
-        at_goal &= bool((turns <= task.goal.rotation_tolerance).all())
-        reached = bool(at_goal) and status == SUCCESS and not log.stopped
-        outcome: Outcome = "success" if reached else "truncated"
-        ended = log.stopped or f"not reached in {len(states) - 1} steps"
-        if reached:
-            ended = "reached"
-        elif status == SUCCESS and not log.stopped:
-            ended = "commanded to the goal, where the joints are not"
-        elif status == COLLISION and not log.stopped:
-            outcome, contact = "collision", world.contact(episodes.q[0], episodes.target[0])
-            ended = f"stopped before {' touches '.join(contact.pair)}" if contact else "contact"
-        latencies, replaced = np.array(log.latencies), int(episodes.interventions[0])
-        told = {"speed": self.settings.speed, "rate": self.rate, "ended": ended}
-        recording = Recording(
+    def _recording(
+        self, goal: Array, episodes: Episodes, path: Array, aims: Array, stopped: str
+    ) -> Recording:
+        """What the joints did for a goal; ``ended`` of its provenance says how it ended."""
+        world, task, contact = self.simulator.world, self.simulator.task, None
+        aims = aims if len(aims) == len(path) else np.tile(goal, (len(path), 1))
+        distances, turns = world.distances(path, aims), world.turns(path[-1:], aims[-1:])
+        there = distances[-1] <= task.tolerance and (turns <= task.goal.rotation_tolerance).all()
+        outcome: Outcome = "truncated"
+        ended = stopped or f"not reached in {len(path) - 1} steps"
+        if episodes.status[0] == COLLISION and not stopped:
+            contact = world.contact(episodes.q[0], episodes.target[0])
+            outcome = "collision"
+            ended = f"stopped before {' touches '.join(contact.pair if contact else ('it', '?'))}"
+        elif episodes.status[0] == SUCCESS and not stopped:
+            outcome = "success" if there else "truncated"
+            ended = "reached" if there else "commanded to the goal, where the joints are not"
+        return Recording(
             policy=self.name,
             problem=self.simulator.problem.pinned,
-            trial=len(self.attempts),
-            states=states,
+            trial=len(self.recordings),
+            states=path,
             distances=distances,
             goal=goal,
             goals=None if task.goal.plain else aims,
@@ -297,41 +248,10 @@ class Run:
             contact=contact.pair if contact else None,
             contact_point=contact.point if contact else None,
             refused=contact.configuration if contact else None,
-            provenance={**told, "cycles": len(latencies), "interventions": replaced},
+            provenance={
+                "ended": ended,
+                "interventions": int(episodes.interventions[0]),
+                "speed": self.speed,
+                "rate": self.rate,
+            },
         )
-        return Attempt(recording, reached, ended, latencies, replaced)
-
-
-@dataclass
-class _Log:
-    """What is kept of an attempt on its way."""
-
-    states: list[Array] = field(default_factory=list)
-    aims: list[Array] = field(default_factory=list)
-    latencies: list[float] = field(default_factory=list)
-    stopped: str = ""
-
-
-def _check_no_memory(layout: ObservationLayout) -> None:
-    """Refuse parts of an observation that depend on more than measured joints and goal."""
-    known = [name for name in ("commanded", *sorted(WITH_MEMORY)) if name in layout.places]
-    known = [*known, *(["history"] if layout.history > 1 else [])]
-    if known and known != ["time_left"]:
-        raise InvalidInputError(
-            f"a policy that sees {', '.join(known)} takes the commanded feedback in a run"
-        )
-
-
-def drawn_goals(simulator: Simulator, count: int, seed: int) -> tuple[Array, Array]:
-    """Start and goals of trials of a task, shape (n_joints,) and (count, goal_width)."""
-    starts, goals = simulator.sample(np.random.default_rng(seed), count)
-    return starts[0], goals
-
-
-def latency_summary(attempts: Sequence[Attempt]) -> str:
-    """Percentiles of the cycles' latencies, in words."""
-    latencies = np.concatenate([attempt.latencies for attempt in attempts])
-    half, most = (1e3 * np.percentile(latencies, share) for share in (50, 99))
-    return (
-        f"{len(latencies)} cycles, {half:.2g} ms in the median, {most:.2g} ms at the 99th percent"
-    )

@@ -97,7 +97,7 @@ class TestStops:
         ((POLICY, "--backend", "fake", "--goal", 3, 3, 3), "out of reach"),
         ((POLICY, "--backend", "fake", "--goal", 3, 3), "a goal is 3 numbers, got 2"),
         ((POLICY, "--backend", "fake", "--rate", 1e6), "a cycle takes"),
-        ((POLICY, "--backend", "fake", "--speed", 2), "speed must be at most 1"),
+        ((POLICY, "--backend", "fake", "--speed", 2), "speed must lie in (0, 1]"),
         ((POLICY, "--backend", "fake", "--arm", "lrmate200ic_5l"), "trained for arm 'paper'"),
         ((POLICY, "--backend", "ur"), "needs --address"),
         ((POLICY, "--backend", "fakes"), "invalid choice"),

@@ -15,7 +15,7 @@ from kinarm.policies import export_policy, load_policy
 from kinarm.policies.running.backend import WiredArm
 from kinarm.policies.running.contract import load_wiring
 from kinarm.policies.running.fake import FakeArm, unchanged
-from kinarm.policies.running.run import Run, RunSettings, drawn_goals
+from kinarm.policies.running.run import Run
 from kinarm.policies.running.watchdog import SafeLimits
 from kinarm.recording import load_recordings, save_recordings
 
@@ -35,7 +35,8 @@ def simulator():
 
 @pytest.fixture(scope="module")
 def trial(simulator):
-    return drawn_goals(simulator, 3, 0)
+    starts, goals = simulator.sample(np.random.default_rng(0), 3)
+    return starts[0], goals
 
 
 @pytest.fixture
@@ -45,7 +46,7 @@ def make(policy, simulator, trial):
     def made(*, world=None, start=None, wiring=None, settings=None, **arm):
         fake = FakeArm(simulator.world, trial[0] if start is None else start, wiring=wiring, **arm)
         wired = WiredArm(fake, world or simulator.world, wiring)
-        return Run(wired, policy, simulator, RunSettings(**(settings or {})))
+        return Run(wired, policy, simulator, **(settings or {}))
 
     return made
 
@@ -85,16 +86,16 @@ class TestMotion:
         start, goals = trial
         told = Told()
         run = make(settings={"speed": speed}, takes=told)
-        (attempt,) = run.to_goals(goals[:1])
+        (made,) = run.to_goals(goals[:1])
         rollout = simulator.rollout(policy, start[None], goals[:1], record=True)
         path = rollout.paths[0, : rollout.steps[0] + 1]
         steps = np.array(told.positions)[: run.parts * len(path[1:])]
         np.testing.assert_allclose(steps[run.parts - 1 :: run.parts], path[1:], rtol=0, atol=1e-12)
         moves = np.diff(np.vstack([start, steps]), axis=0)
-        fastest = speed * simulator.arm.velocity_limits * run.arm.period
+        fastest = speed * simulator.arm.velocity_limits * (1 / run.rate)
         assert (np.abs(moves) <= fastest + 1e-12).all()
-        assert attempt.reached
-        assert len(attempt.recording.states) == len(path)
+        assert made.outcome == "success"
+        assert len(made.states) == len(path)
 
     def test_signs_and_offsets(self, make, trial):
         plain, wired = Told(), Told()
@@ -103,18 +104,18 @@ class TestMotion:
         expected = np.array(plain.positions) * WIRING["sign"] + WIRING["offset"]
         np.testing.assert_allclose(np.array(wired.positions), expected, rtol=0, atol=1e-12)
 
-    @pytest.mark.parametrize("feedback", ["commanded", "measured"])
-    def test_an_arm_that_lags(self, make, trial, feedback):
-        settings = {"feedback": feedback, "speed": 0.5}
-        attempts = make(plant=Plant(**LAG, noise=1e-4), settings=settings).to_goals(trial[1])
-        assert [attempt.reached for attempt in attempts] == [True] * 3
+    @pytest.mark.parametrize("measured", [False, True])
+    def test_an_arm_that_lags(self, make, trial, measured):
+        settings = {"measured": measured, "speed": 0.5}
+        made = make(plant=Plant(**LAG, noise=1e-4), settings=settings).to_goals(trial[1])
+        assert [each.outcome for each in made] == ["success"] * 3
 
     def test_recordings(self, make, trial, tmp_path):
-        attempts = make().to_goals(trial[1])
-        save_recordings(tmp_path / "run.npz", [each.recording for each in attempts])
+        made = make().to_goals(trial[1])
+        save_recordings(tmp_path / "run.npz", made)
         kept = load_recordings(tmp_path / "run.npz")
         assert [each.outcome for each in kept] == ["success"] * 3
-        assert kept[1].same_trial(attempts[1].recording)
+        assert kept[1].same_trial(made[1])
         np.testing.assert_allclose(kept[1].states[0], kept[0].states[-1], rtol=0, atol=1e-9)
 
     def test_shield_keeps_from_contact(self, policy, simulator):
@@ -126,10 +127,10 @@ class TestMotion:
         k = touching[0]
         for world, outcome in ((bare, "collision"), (simulator, "success")):
             fake = FakeArm(simulator.world, starts[k])
-            run = Run(WiredArm(fake, world.world), policy, world, RunSettings())
-            (attempt,) = run.to_goals(goals[k : k + 1])
-            assert attempt.recording.outcome == outcome
-            assert (attempt.interventions > 0) == (outcome == "success")
+            run = Run(WiredArm(fake, world.world), policy, world)
+            (made,) = run.to_goals(goals[k : k + 1])
+            assert made.outcome == outcome
+            assert (made.provenance["interventions"] > 0) == (outcome == "success")
 
 
 class TestStops:
@@ -138,8 +139,7 @@ class TestStops:
     def check(self, run, goals, words):
         with pytest.raises(RunStoppedError, match=words):
             run.to_goals(goals)
-        assert len(run.attempts) == 1
-        assert run.attempts[0].recording.outcome == "truncated"
+        assert [each.outcome for each in run.recordings] == ["truncated"]
         assert at_rest(run.arm.backend)
 
     def test_lost_connection(self, make, trial):
@@ -160,7 +160,7 @@ class TestStops:
             kept.append(positions)
             return kept[min(len(kept) - 1, 12)]
 
-        run = make(reads=frozen, settings={"watchdog": SafeLimits(distance=10.0)})
+        run = make(reads=frozen, settings={"limits": SafeLimits(distance=10.0)})
         self.check(run, trial[1], "readings have not changed")
 
     def test_no_numbers(self, make, trial):
@@ -192,11 +192,11 @@ class TestStops:
             pushed.append(positions)
             return positions + (np.arange(6) == 0) * 0.3 * max(len(pushed) - 20, 0)
 
-        run = make(reads=push, settings={"watchdog": SafeLimits(distance=10.0)})
+        run = make(reads=push, settings={"limits": SafeLimits(distance=10.0)})
         self.check(run, trial[1], "axis_1 is .* too fast")
 
     def test_too_abrupt(self, make, trial):
-        run = make(settings={"speed": 1.0, "watchdog": SafeLimits(acceleration=1.0)})
+        run = make(settings={"speed": 1.0, "limits": SafeLimits(acceleration=1.0)})
         self.check(run, trial[1], "too abrupt")
 
     def test_contact_of_the_arm(self, make, trial):
@@ -208,9 +208,9 @@ class TestStops:
         run = make(takes=Told(31, raising(KeyboardInterrupt())))
         with pytest.raises(KeyboardInterrupt):
             run.to_goals(trial[1])
-        (attempt,) = run.attempts
-        assert attempt.ended == "interrupted"
-        assert attempt.recording.steps > 5
+        (made,) = run.recordings
+        assert made.provenance["ended"] == "interrupted"
+        assert made.steps > 5
         assert at_rest(run.arm.backend)
 
 
@@ -244,7 +244,7 @@ class TestRefusals:
     def test_contract_of_another_arm(self, policy, simulator, make):
         other = Simulator(simulator.problem.replace(arm="lrmate200ic_5l"), threads=1)
         with pytest.raises(PolicyFileError, match="trained for arm 'paper'"):
-            Run(make().arm, policy, other, RunSettings())
+            Run(make().arm, policy, other)
 
     def test_arm_with_other_joints(self, simulator):
         fake = FakeArm(simulator.world, simulator.arm.home)
@@ -260,16 +260,16 @@ class TestRefusals:
         moved = Simulator(simulator.problem, threads=1)
         moved.world.has_random_bodies = True
         with pytest.raises(ProblemError, match="random or move"):
-            Run(make().arm, policy, moved, RunSettings())
+            Run(make().arm, policy, moved)
 
     def test_memory_of_measurements(self, make, policy, simulator):
         other = Simulator(simulator.problem.replace(observation={"history": 2}), threads=1)
-        with pytest.raises(InvalidInputError, match="sees history takes the commanded"):
-            Run(make().arm, policy, other, RunSettings(feedback="measured"))
+        with pytest.raises(InvalidInputError, match="sees a history takes commanded"):
+            Run(make().arm, policy, other, measured=True)
 
-    def test_speed(self):
-        with pytest.raises(InvalidInputError, match="speed must be at most 1"):
-            RunSettings(speed=1.5)
+    def test_speed(self, make):
+        with pytest.raises(InvalidInputError, match="speed must lie in"):
+            make(settings={"speed": 1.5})
 
     def test_changed_folder(self, policy, tmp_path):
         export_policy(policy, tmp_path / "out", onnx=False)
