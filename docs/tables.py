@@ -271,7 +271,26 @@ def servos_table() -> str:
     return markdown_table(["plant", "apart %", *heads], rows)
 
 
+def injections_table() -> str:
+    """Errors of arms that the check of a contract was given, and how many it missed, by kind."""
+    record = json.loads((RESULTS / "contract" / "injections.json").read_text(encoding="utf-8"))
+    kinds = [kind for kind in record[0]["tally"] if kind != "no error"]
+    rows = [
+        [
+            kind,
+            f"{sum(each['tally'].get(kind, 0) for each in record)}",
+            f"{sum(each['missed'].count(kind) for each in record)}",
+        ]
+        for kind in kinds
+    ]
+    clean = sum(each["tally"]["no error"] for each in record)
+    imagined = sum(len(each["imagined"]) for each in record)
+    rows.append(["no error", f"{clean}", f"{imagined} imagined"])
+    return markdown_table(["error, in", "arms", "missed"], rows)
+
+
 TABLES = {
+    "injections": injections_table,
     "plants": plants_table,
     "servos": servos_table,
     "arm": lambda: arm_table("paper"),

@@ -7,6 +7,7 @@ which ``docs/tables.py`` makes the table of *Run it on an arm*.
 import argparse
 import json
 from collections import Counter, deque
+from itertools import product
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -34,10 +35,8 @@ PLACING = 0.03
 
 
 class Injection(NamedTuple):
-    """An error of an arm: what becomes of its readings and commands."""
+    """What becomes of an arm's readings and commands."""
 
-    kind: str
-    place: str
     reads: Distortion
     takes: Distortion
 
@@ -50,7 +49,7 @@ def injection(rng: np.random.Generator, kind: str, place: str, pose: Array, n: i
             break
     reads = unchanged if place == "command" else forth
     takes = {"reading": unchanged, "command": forth, "both": back}[place]
-    return Injection(kind, place, reads, takes)
+    return Injection(reads, takes)
 
 
 def distortions(
@@ -88,58 +87,46 @@ def distortions(
 
 
 def draw_pose(rng: np.random.Generator, world: World) -> Array:
-    """A pose at which joints are distinct and away from zero, with room around."""
+    """A pose at which joints are distinct and away from zero."""
     arm, n = world.arm, world.n_actions
+    lower, upper = np.maximum(arm.lower[:n], -2) + 0.2, np.minimum(arm.upper[:n], 2) - 0.2
     while True:
         pose = arm.home.copy()
-        pose[:n] = rng.uniform(
-            np.maximum(arm.lower[:n], -2) + 0.2, np.minimum(arm.upper[:n], 2) - 0.2
-        )
+        pose[:n] = rng.uniform(lower, upper)
         apart = np.abs(pose[:n, None] - pose[None, :n]) + np.eye(n)
-        if np.abs(pose[:n]).min() > 0.25 and apart.min() > 0.25 and not world.in_contact(pose):
+        if np.abs(pose[:n]).min() > 0.25 and apart.min() > 0.25:
             return pose
-
-
-def check(world: World, arm: FakeArm, pose: Array, found: Injection, start: Array) -> list[str]:
-    """What the check says of an arm with an error."""
-    arm.start, arm.reads, arm.takes = start, found.reads, found.takes
-    try:
-        return ContractCheck(WiredArm(arm, world), world, pose).run()
-    except RunStoppedError as stopped:
-        return [str(stopped)]
 
 
 def measure(arm: str, count: int, clean: int, seed: int = 0) -> dict[str, Any]:
     """Check an arm with so many errors, and without any."""
-    world = World(
-        ReachProblem.load("both").replace(arm=arm, scene=Scene(obstacles=(), ground=False))
-    )
+    scene = Scene(obstacles=(), ground=False)
+    world = World(ReachProblem.load("both").replace(arm=arm, scene=scene))
     rng, n = np.random.default_rng(seed), world.n_actions
-    fake = FakeArm(world, world.arm.home, plant=PLANT)
-    tally, missed, imagined = Counter[str](), [], []
-    kinds = [
-        (kind, place) for kind in KINDS for place in PLACES if kind != "stale" or place == "reading"
-    ]
-    for number in range(count + clean):
+    fake, tally = FakeArm(world, world.arm.home, plant=PLANT), Counter[str]()
+    missed, imagined = list[str](), list[str]()
+    kinds = [each for each in product(KINDS, PLACES) if "stale" not in each or "reading" in each]
+    while (done := tally.total()) < count + clean:
         pose = draw_pose(rng, world)
-        kind, place = kinds[number % len(kinds)]
-        start = pose.copy()
-        start[:n] += rng.uniform(-PLACING, PLACING, n)
-        error = injection(rng, kind, place, pose, n)
-        if number >= count:
-            error = Injection("none", "nowhere", unchanged, unchanged)
         try:
-            said = check(world, fake, pose, error, start)
-        except InvalidInputError:  # no room at this pose
-            said = None
-        if said is None:
-            tally["no room"] += 1
-        elif number >= count:
-            tally["without"] += 1
+            check = ContractCheck(WiredArm(fake, world), world, pose)
+        except InvalidInputError:  # too narrow
+            continue
+        kind, place = kinds[done % len(kinds)]
+        error = injection(rng, kind, place, pose, n)
+        if done >= count:
+            kind, place, error = "no error", "", Injection(unchanged, unchanged)
+        fake.start, (fake.reads, fake.takes) = pose.copy(), error
+        fake.start[:n] += rng.uniform(-PLACING, PLACING, n)
+        try:
+            said = check.run()
+        except RunStoppedError as stopped:
+            said = [str(stopped)]
+        tally[f"{kind}, {place}".rstrip(", ")] += 1
+        if done >= count:
             imagined += said
-        else:
-            tally[f"{kind}, {place}"] += 1
-            missed += [] if said else [f"{kind}, {place}"]
+        elif not said:
+            missed.append(f"{kind}, {place}")
     return {"arm": arm, "tally": dict(tally), "missed": missed, "imagined": imagined}
 
 

@@ -38,7 +38,7 @@ class ArmOptions(ProblemOptions):
         Commands per second [Hz].
     """
 
-    policy: str = field(metadata={"flag": "policy", "metavar": "POLICY_OR_FOLDER"})
+    policy: str = field(metadata={"flag": "policy", "metavar": "POLICY"})
     backend: Literal["fake", "mujoco", "ur", "lerobot"]
     address: str | None = None
     rate: float | None = field(default=None, metadata=POSITIVE)
@@ -67,29 +67,22 @@ class ArmOptions(ProblemOptions):
     ) -> "WiredArm":
         """The arm, by its contract; a simulated one rests at a start."""
         from kinarm.plant import Plant
-        from kinarm.policies.running.backend import Backend, WiredArm
+        from kinarm.policies.running.backend import WiredArm
+        from kinarm.policies.running.fake import FakeArm
+        from kinarm.policies.running.mujoco_arm import BANDWIDTH, MujocoArm
+        from kinarm.policies.running.so_arm import SOArm
+        from kinarm.policies.running.ur import URArm
 
         world, plant = simulator.world, Plant.load(self.plant or "ideal")
-        if self.backend in ("ur", "lerobot") and self.address is None:
-            raise InvalidInputError(f"--backend {self.backend} needs --address")
         if self.backend == "fake":
-            from kinarm.policies.running.fake import FakeArm
-
-            backend: Backend = FakeArm(world, start, plant=plant, wiring=wiring)
-        elif self.backend == "mujoco":
-            from kinarm.policies.running.mujoco_arm import BANDWIDTH, MujocoArm
-
-            backend = MujocoArm(world, start, plant.range_of("bandwidth")[0] or BANDWIDTH)
-            wiring = None
-        elif self.backend == "ur":
-            from kinarm.policies.running.ur import URArm
-
-            backend = URArm(str(self.address))
-        else:
-            from kinarm.policies.running.so_arm import SOArm
-
-            backend = SOArm(str(self.address))
-        return WiredArm(backend, world, wiring)
+            return WiredArm(FakeArm(world, start, plant=plant, wiring=wiring), world, wiring)
+        if self.backend == "mujoco":
+            bandwidth = plant.range_of("bandwidth")[0] or BANDWIDTH
+            return WiredArm(MujocoArm(world, start, bandwidth), world)
+        if self.address is None:
+            raise InvalidInputError(f"--backend {self.backend} needs --address")
+        make = URArm if self.backend == "ur" else SOArm
+        return WiredArm(make(self.address), world, wiring)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -206,10 +199,10 @@ def _report(out: Path | None, run: "Run") -> None:
     from kinarm.recording import save_recordings
 
     for each in run.recordings:
-        place = ", ".join(f"{value:.3f}" for value in each.goal)
+        place, told = ", ".join(f"{value:.3f}" for value in each.goal), each.provenance
         print(
-            f"goal {each.trial + 1} ({place}): {each.provenance['ended']}, {each.final_distance:.3f}"
-            f" m from it after {each.steps} steps, {each.provenance['interventions']} replaced"
+            f"goal {each.trial + 1} ({place}): {told['ended']}, {each.final_distance:.3f} m from it"
+            f" after {each.steps} steps, {told['interventions']} replaced"
         )
     if run.latencies:
         half, most = (1e3 * np.percentile(run.latencies, share) for share in (50, 99))

@@ -130,11 +130,15 @@ class WiredArm:
         try:
             self.backend.connect(self.period)
         except FAILURES as error:
-            self.__exit__()
+            self._close()
             raise RunStoppedError(f"no connection to the arm: {error}") from error
         return self
 
     def __exit__(self, *_: object) -> None:
+        self.stop()
+        self._close()
+
+    def _close(self) -> None:
         with suppress(*FAILURES):
             self.backend.close()
 

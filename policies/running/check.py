@@ -28,6 +28,9 @@ STAYS = 0.03
 OFF = 0.08
 """Error of a joint's way that counts, as a share of it."""
 
+NEARBY = 500
+"""Configurations around the pose that must be free."""
+
 READINGS = 20
 """Readings of a resting arm that are averaged."""
 
@@ -66,32 +69,29 @@ class ContractCheck:
         self.arm, self.rate, self._names = arm, rate, world.arm.joint_names
         pose = world.arm.home if at is None else at
         self.pose = within_limits("the pose", pose, world.arm.chain, self._names)
-        self._n, self._limits = world.n_actions, (world.arm.lower, world.arm.upper)
-        if (pair := world.contact_pair(self.pose)) is not None:
-            raise InvalidInputError(f"at the pose of the check, {pair[0]} touches {pair[1]}")
+        self._n = world.n_actions
+        off = np.random.default_rng(0).uniform(-PLACED - MOVE, PLACED + MOVE, (NEARBY, self._n))
+        around = np.tile(self.pose, (NEARBY, 1))
+        around[1:, : self._n] += off[1:]
+        if (touching := world.in_contact(around)).any():
+            pair = world.contact_pair(around[touching.argmax()])
+            met = " touches ".join(pair or ("it", "something"))
+            raise InvalidInputError(f"the pose of the check is too narrow: around it, {met}")
         self._moves = np.array([self._move(world, joint) for joint in range(self._n)])
         self._step = SPEED * world.arm.velocity_limits[: self._n].min() / rate
 
     def _move(self, world: World, joint: int) -> float:
-        """Way of a joint from the pose that stays free, and within its limits [rad or m]."""
-        for way in (MOVE, -MOVE):
-            end = self.pose.copy()
-            end[joint] += way * (1.0 + 2.0 * STAYS)
-            within = self._limits[0][joint] <= end[joint] <= self._limits[1][joint]
-            if within and world.contact(self.pose, end) is None:
-                return way
-        raise InvalidInputError(f"at the pose of the check, {self._names[joint]} has no room")
+        """Way of a joint towards the middle of its range [rad or m]."""
+        below, above = world.arm.lower[joint], world.arm.upper[joint]
+        return MOVE if 2.0 * self.pose[joint] < below + above else -MOVE
 
     def run(self) -> list[str]:
         """Check the arm; what is wrong, a line each, and nothing if all is well.
 
         Raises RunStoppedError if the arm does not answer.
         """
-        with self.arm.connected(self.rate) as arm:
-            try:
-                return self._misplaced() or self._restless() or self._moved_wrongly()
-            finally:
-                arm.stop()
+        with self.arm.connected(self.rate):
+            return self._misplaced() or self._restless() or self._moved_wrongly()
 
     def unseen(self) -> list[str]:
         """What both ways may have wrong without its showing at the pose, a line each."""

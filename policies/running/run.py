@@ -111,7 +111,6 @@ class Run:
             self._rehearse(aims[0])
             for goal in aims:
                 self._reach(goal)
-            arm.stop()
         return self.recordings
 
     def _check_goals(self, goals: Array) -> None:
@@ -175,7 +174,6 @@ class Run:
         except KeyboardInterrupt:
             stopped = "interrupted"
             states.append(self._settled())
-            self.arm.stop()
             raise
         finally:
             aims = [*aims, episodes.goal[0].copy()][: len(states)]

@@ -39,7 +39,13 @@ def test_help_loads_nothing_heavy():
         *PROGRAMS,
         *("kinarm-problem list", "kinarm-problem show", "kinarm-problem check"),
         *("kinarm-problem import", "kinarm-arms list", "kinarm-arms show"),
-        *("kinarm-study status", "kinarm-study curves", "kinarm-train ars", "kinarm-train ppo"),
+        *(
+            "kinarm-run check",
+            "kinarm-study status",
+            "kinarm-study curves",
+            "kinarm-train ars",
+            "kinarm-train ppo",
+        ),
     ],
 )
 def test_help_fits_a_terminal(run, words, monkeypatch):

@@ -26,7 +26,16 @@ LONG = {
 }
 """Commands of which it is enough that they accept their examples."""
 
-ELSEWHERE = (" status ", "my_module:LEARNER", "model.zip", "--live", "my.urdf", "ur5", ">")
+ELSEWHERE = (
+    " status ",
+    "my_module:LEARNER",
+    "model.zip",
+    "--live",
+    "my.urdf",
+    "ur5",
+    "--address",
+    ">",
+)
 """Parts of examples that need what is not there, or a shell, or never end."""
 
 
@@ -92,6 +101,11 @@ def test_examples_of_evaluating_and_replaying(run, place):
 def test_examples_of_exporting(run, place):
     pytest.importorskip("onnx")
     check(run, examples_of(run, "kinarm-export"), least=2)
+
+
+def test_examples_of_running(run, place):
+    pytest.importorskip("mujoco")
+    check(run, examples_of(run, "kinarm-run"), least=2)
 
 
 def test_examples_of_problems(run, place):

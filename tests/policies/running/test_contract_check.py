@@ -83,5 +83,5 @@ def test_pose_in_contact(world):
     rng, arm = np.random.default_rng(0), world.arm
     q = rng.uniform(arm.lower, arm.upper, (200, 6))
     pose = q[world.in_contact(q)][0]
-    with pytest.raises(InvalidInputError, match="at the pose of the check, .* touches"):
+    with pytest.raises(InvalidInputError, match="too narrow: around it, .* touches"):
         ContractCheck(WiredArm(FakeArm(world, POSE), world), world, pose)
