@@ -24,6 +24,7 @@ from .errors import OutputError as OutputError
 from .errors import PolicyFileError as PolicyFileError
 from .errors import ProblemError as ProblemError
 from .errors import RecordingFileError as RecordingFileError
+from .errors import RunStoppedError as RunStoppedError
 from .errors import StartInContactError as StartInContactError
 from .errors import TrainingFailedError as TrainingFailedError
 from .errors import UnknownNameError as UnknownNameError

@@ -19,6 +19,7 @@ EXAMPLES = [
     errors.WorkerError("a worker ended"),
     errors.TrainingFailedError({"ars right seed 0": "too fast"}, 4),
     errors.NoPathError(100),
+    errors.RunStoppedError("lost the arm"),
 ]
 
 
