@@ -16,7 +16,7 @@ from kinarm._fields import to_plain
 from kinarm._files import absolute, check_folder, save_archive, shipped_files, write_atomically
 from kinarm.arm import Arm
 from kinarm.clearance import random_configurations
-from kinarm.errors import InvalidInputError, OutputError, finite_array
+from kinarm.errors import InvalidInputError, OutputError, PolicyFileError, finite_array
 from kinarm.kernels.compiling import Array
 from kinarm.policies import arm_policy
 from kinarm.policies.conversion.to_torch import command_module, onnx_model
@@ -216,3 +216,17 @@ def _readme(contract: dict[str, Any]) -> str:
     ]
     text = shipped_files("help", ".txt")["exported"].read_text()
     return text.format(**contract, table="\n".join(rows))
+
+
+def load_wiring(folder: Path) -> dict[str, Any]:
+    """Signs and offsets of the joints, of an exported folder that passes its self-test.
+
+    PolicyFileError if it does not.
+    """
+    try:
+        wrong, arm = arm_policy.self_test(folder), arm_policy.ArmPolicy(folder).arm
+    except (OSError, ValueError, KeyError, TypeError) as error:
+        raise PolicyFileError(f"{str(folder)!r} is no exported folder: {error}") from error
+    if wrong:
+        raise PolicyFileError(f"{str(folder)!r} fails its self-test: {wrong[0]}")
+    return {name: arm[name] for name in WIRING}

@@ -18,7 +18,7 @@ from kinarm.errors import InvalidInputError, RunStoppedError
 from kinarm.kernels.compiling import Array
 from kinarm.policies.running.backend import WiredArm
 from kinarm.policies.running.check import ContractCheck
-from kinarm.policies.running.fake import Distortion, FakeArm, unchanged
+from kinarm.policies.running.fake import Distortion, FakeArm
 from kinarm.world import World
 
 PLANT = Plant(delay=(0, 2), bandwidth=(1.6, 20.0), noise=(1e-4, 2e-3))
@@ -47,8 +47,8 @@ def injection(rng: np.random.Generator, kind: str, place: str, pose: Array, n: i
         forth, back = distortions(rng, kind, len(pose), n)
         if place != "both" or np.abs(forth(pose) - pose)[:n].max() > SEEN:
             break
-    reads = unchanged if place == "command" else forth
-    takes = {"reading": unchanged, "command": forth, "both": back}[place]
+    reads = np.copy if place == "command" else forth
+    takes = {"reading": np.copy, "command": forth, "both": back}[place]
     return Injection(reads, takes)
 
 
@@ -68,7 +68,7 @@ def distortions(
             seen[joints] = held[0][joints]
             return seen
 
-        return late, unchanged
+        return late, np.copy
     if kind == "order":
         order[[joint, other]] = other, joint
     elif kind == "sign":
@@ -115,7 +115,7 @@ def measure(arm: str, count: int, clean: int, seed: int = 0) -> dict[str, Any]:
         kind, place = kinds[done % len(kinds)]
         error = injection(rng, kind, place, pose, n)
         if done >= count:
-            kind, place, error = "no error", "", Injection(unchanged, unchanged)
+            kind, place, error = "no error", "", Injection(np.copy, np.copy)
         fake.start, (fake.reads, fake.takes) = pose.copy(), error
         fake.start[:n] += rng.uniform(-PLACING, PLACING, n)
         try:

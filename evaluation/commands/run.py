@@ -46,11 +46,11 @@ class ArmOptions(ProblemOptions):
     def faced(self) -> "tuple[Policy, Simulator, Mapping[str, Any] | None]":
         """Policy, simulator without a plant, and the contract's signs and offsets, if any."""
         from kinarm.evaluation.finding import find_contestants
-        from kinarm.policies.running.contract import is_exported, load_wiring
+        from kinarm.policies.export import load_wiring
         from kinarm.simulator import Simulator
 
         folder = Path(self.policy)
-        wiring = load_wiring(folder) if is_exported(folder) else None
+        wiring = load_wiring(folder) if (folder / "contract.json").is_file() else None
         name = folder / "policy.npz" if wiring else self.policy
         ideal = replace(self, plant="ideal", feedback=None)
         stated = ideal.resolve() if self.problem or self.task else None
@@ -65,7 +65,7 @@ class ArmOptions(ProblemOptions):
     def arm_of(
         self, simulator: "Simulator", wiring: Mapping[str, Any] | None, start: Any
     ) -> "WiredArm":
-        """The arm, by its contract; a simulated one rests at a start."""
+        """The arm, by its contract; a simulated one rests at a start, and counts as the model."""
         from kinarm.plant import Plant
         from kinarm.policies.running.backend import WiredArm
         from kinarm.policies.running.fake import FakeArm
@@ -75,7 +75,7 @@ class ArmOptions(ProblemOptions):
 
         world, plant = simulator.world, Plant.load(self.plant or "ideal")
         if self.backend == "fake":
-            return WiredArm(FakeArm(world, start, plant=plant, wiring=wiring), world, wiring)
+            return WiredArm(FakeArm(world, start, plant=plant), world)
         if self.backend == "mujoco":
             bandwidth = plant.range_of("bandwidth")[0] or BANDWIDTH
             return WiredArm(MujocoArm(world, start, bandwidth), world)

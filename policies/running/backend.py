@@ -1,8 +1,8 @@
 """Backends: arms that can be read and commanded, each in its own convention."""
 
 import time
-from collections.abc import Callable, Mapping
-from contextlib import suppress
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager, suppress
 from typing import Any, Protocol, Self
 
 import numpy as np
@@ -17,7 +17,7 @@ FAILURES = (OSError, RuntimeError)
 
 
 class Backend(Protocol):
-    """An arm that can be read and commanded.
+    """An arm that can be read and commanded; its time is real unless it says otherwise.
 
     Joint positions have the shape (n_joints,) [rad or m], in the arm's own
     signs and offsets. A failure is one of `FAILURES`.
@@ -31,7 +31,7 @@ class Backend(Protocol):
     """
 
     joint_names: tuple[str, ...]
-    rate: float | None
+    rate: float | None = None
 
     def connect(self, period: float) -> None:
         """Connect, for a command every so often [s]; nothing moves."""
@@ -50,35 +50,25 @@ class Backend(Protocol):
 
     def now(self) -> float:
         """Time of the arm [s]."""
-
-    def wait(self, until: float) -> None:
-        """Wait until a time [s]."""
-
-
-class RealTime:
-    """The clock of arms that are not simulated."""
-
-    def now(self) -> float:
-        """Time [s]."""
         return time.perf_counter()
 
     def wait(self, until: float) -> None:
-        """Sleep until a time [s]."""
+        """Wait until a time [s]."""
         time.sleep(max(until - self.now(), 0.0))
 
 
-class SimulatedTime:
-    """The clock of simulated arms: waiting takes no time, and moves them on."""
+class SimulatedArm(Backend, Protocol):
+    """A backend in a simulation: waiting takes no time, and moves it on in whole periods."""
 
-    def __init__(self) -> None:
-        self.time, self.period = 0.0, 0.02
+    time: float
+    period: float
 
     def now(self) -> float:
         """Simulated time [s]."""
         return self.time
 
     def wait(self, until: float) -> None:
-        """Move on until a time [s], in whole periods."""
+        """Move on until a time [s]."""
         while self.time + 0.5 * self.period < until:
             self.advance()
             self.time += self.period
@@ -86,26 +76,23 @@ class SimulatedTime:
     def advance(self) -> None:
         """Move on by a period."""
 
+    def close(self) -> None:
+        """Nothing is left open."""
+        return
+
 
 class WiredArm:
-    """A backend in the convention of the model, connected within ``with``.
+    """A backend in the convention of the model; failures are a `RunStoppedError`.
 
     Parameters
     ----------
     backend : Backend
         The arm.
     world : World
-        World of the model.
+        World of the model; InvalidInputError if it has other joints.
     wiring : mapping, optional
         ``sign`` and ``offset`` of each joint, as of a contract; by default the
         arm counts as the model does.
-
-    Raises
-    ------
-    InvalidInputError
-        If the backend has other joints than the model.
-    RunStoppedError
-        If the arm does not answer.
     """
 
     def __init__(
@@ -116,31 +103,21 @@ class WiredArm:
                 f"the backend has the joints {', '.join(backend.joint_names)}, arm "
                 f"{world.arm.name!r} has {', '.join(world.arm.joint_names)}"
             )
-        n = len(backend.joint_names)
         self.backend, self.now = backend, backend.now
-        self._wiring = {"sign": np.ones(n), "offset": np.zeros(n)} if wiring is None else wiring
-        self.period = 0.0
+        self._wiring = wiring or {"sign": 1.0, "offset": 0.0}
 
-    def connected(self, rate: float) -> Self:
-        """The arm itself, to be commanded at a rate [Hz]."""
-        self.period = 1.0 / rate
-        return self
-
-    def __enter__(self) -> Self:
+    @contextmanager
+    def connected(self, rate: float) -> Iterator[Self]:
+        """The arm, to be commanded at a rate [Hz]; it is at rest afterwards."""
         try:
-            self.backend.connect(self.period)
-        except FAILURES as error:
-            self._close()
-            raise RunStoppedError(f"no connection to the arm: {error}") from error
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.stop()
-        self._close()
-
-    def _close(self) -> None:
-        with suppress(*FAILURES):
-            self.backend.close()
+            self._asked(self.backend.connect, 1.0 / rate)
+            try:
+                yield self
+            finally:
+                self.stop()
+        finally:
+            with suppress(*FAILURES):
+                self.backend.close()
 
     def read(self) -> Array:
         """Joint positions of the model, shape (n_joints,) [rad or m]."""

@@ -1,8 +1,7 @@
 """A fake arm, which obeys as a plant does."""
 
 import sys
-from collections.abc import Callable, Mapping
-from typing import Any
+from collections.abc import Callable
 
 import numpy as np
 
@@ -12,8 +11,7 @@ from kinarm.kernels.compiling import Array
 from kinarm.kernels.plant import COMMAND
 from kinarm.observation_choice import Observation
 from kinarm.plant import Plant, PlantLike
-from kinarm.policies.arm_policy import from_readings, to_readings
-from kinarm.policies.running.backend import SimulatedTime
+from kinarm.policies.running.backend import SimulatedArm
 from kinarm.simulator import Simulator
 from kinarm.task import LONGEST_HORIZON
 from kinarm.world import World
@@ -25,12 +23,7 @@ Distortion = Callable[[Array], Array]
 """From joint positions to other ones, shape (n_joints,) [rad or m]."""
 
 
-def unchanged(positions: Array) -> Array:
-    """The same positions."""
-    return positions
-
-
-class FakeArm(SimulatedTime):
+class FakeArm(SimulatedArm):
     """An arm that lags as a plant does, and stops before it touches something.
 
     Parameters
@@ -41,13 +34,9 @@ class FakeArm(SimulatedTime):
         Where it rests [rad or m].
     plant : Plant, str or Path
         What lies between command and joint; each period is a step of it.
-    wiring : mapping, optional
-        ``sign`` and ``offset`` of each joint, by which it counts.
     reads, takes : callable
         What becomes of its readings and commands: errors on purpose.
     """
-
-    rate: float | None = None
 
     def __init__(
         self,
@@ -55,21 +44,17 @@ class FakeArm(SimulatedTime):
         start: Array,
         *,
         plant: PlantLike = "ideal",
-        wiring: Mapping[str, Any] | None = None,
-        reads: Distortion = unchanged,
-        takes: Distortion = unchanged,
+        reads: Distortion = np.copy,
+        takes: Distortion = np.copy,
     ) -> None:
-        super().__init__()
-        self.joint_names = world.arm.joint_names
-        n = len(self.joint_names)
+        self.joint_names, self.time, self.period = world.arm.joint_names, 0.0, 0.0
         self.start, self.reads, self.takes = np.array(start, dtype=float), reads, takes
-        self._wiring = {"sign": np.ones(n), "offset": np.zeros(n)} if wiring is None else wiring
         self._problem, self._plant = world.problem, Plant.load(plant)
-        self._simulator: Simulator | None = None
+        self._simulators = dict[float, Simulator]()
 
     def connect(self, period: float) -> None:
         """Rest at the start."""
-        if self._simulator is None or period != self.period:
+        if period not in self._simulators:
             problem = self._problem.replace(
                 plant=self._plant,
                 feedback="measured",
@@ -80,7 +65,8 @@ class FakeArm(SimulatedTime):
                 goal=GoalSpecification(),
                 observation=Observation(),
             )
-            self._simulator, self.period = Simulator(problem, threads=1), period
+            self._simulators[period] = Simulator(problem, threads=1)
+        self._simulator, self.period = self._simulators[period], period
         goal = self._simulator.world.reached(self.start[None]) + FAR
         self._episodes = self._simulator.reset(self.start[None], goal)
         self._told = self.start
@@ -88,15 +74,14 @@ class FakeArm(SimulatedTime):
     def read(self) -> Array:
         """Where sensors have the joints."""
         seen = self._episodes.sensed if len(self._episodes.sensed) else self._episodes.q
-        return self.reads(np.asarray(to_readings(self._wiring, seen[0])))
+        return self.reads(seen[0].copy())
 
     def command(self, positions: Array) -> None:
         """Send the joints to positions, as fast as they can."""
-        self._told = np.asarray(from_readings(self._wiring, self.takes(positions)))
+        self._told = self.takes(positions)
 
     def advance(self) -> None:
         """Move on by a step of the plant."""
-        assert self._simulator is not None
         episodes, n = self._episodes, self._simulator.n_actions
         last = episodes.drive[0, COMMAND] if len(episodes.drive) else episodes.q[0, :n]
         action = (self._told[:n] - last) / self._simulator.step_limit
@@ -109,6 +94,3 @@ class FakeArm(SimulatedTime):
     def stop(self) -> None:
         """Rest where the joints are."""
         self._told = self._episodes.q[0].copy()
-
-    def close(self) -> None:
-        """Nothing is left open."""

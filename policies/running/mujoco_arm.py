@@ -8,17 +8,12 @@ import numpy as np
 from kinarm.errors import needed
 from kinarm.kernels.compiling import Array
 from kinarm.mjcf import mjcf
-from kinarm.policies.running.backend import SimulatedTime
+from kinarm.policies.running.backend import SimulatedArm
 from kinarm.world import World
 
-SUBSTEP = 0.0005
-"""Time step of MuJoCo [s]."""
-
-ARMATURE = 100.0
-"""Inertia of the geared motors [kg m2]; links of 1 kg hardly move each other."""
-
-BANDWIDTH = 20.0
-"""Natural frequency of servos of which the plant says nothing [Hz]."""
+SUBSTEP, ARMATURE, BANDWIDTH = 0.0005, 100.0, 20.0
+"""Time step of MuJoCo [s], inertia of the geared motors, beside which that of links hardly counts
+[kg m2], and natural frequency of servos of which the plant says nothing [Hz]."""
 
 
 def servo_model(mujoco: ModuleType, world: World, bandwidth: float) -> Any:
@@ -35,7 +30,7 @@ def servo_model(mujoco: ModuleType, world: World, bandwidth: float) -> Any:
     return model
 
 
-class MujocoArm(SimulatedTime):
+class MujocoArm(SimulatedArm):
     """The arm of a world in MuJoCo, which stops if it touches something.
 
     Joints that actions do not move are at home.
@@ -50,10 +45,7 @@ class MujocoArm(SimulatedTime):
         Natural frequency of its servos [Hz].
     """
 
-    rate: float | None = None
-
     def __init__(self, world: World, start: Array, bandwidth: float = BANDWIDTH) -> None:
-        super().__init__()
         self._mujoco = needed("mujoco", "mujoco", "mujoco")
         self.joint_names, self._home = world.arm.joint_names, world.arm.home
         self._model = servo_model(self._mujoco, world, bandwidth)
@@ -63,7 +55,7 @@ class MujocoArm(SimulatedTime):
 
     def connect(self, period: float) -> None:
         """Rest at the start."""
-        self.period, state = period, self._state
+        self.time, self.period, state = 0.0, period, self._state
         self._mujoco.mj_resetData(self._model, state)
         state.qpos[:] = state.ctrl[:] = self.start[: self._model.nq]
         self._mujoco.mj_forward(self._model, state)
@@ -88,6 +80,3 @@ class MujocoArm(SimulatedTime):
     def stop(self) -> None:
         """Hold the joints where they are."""
         self._state.ctrl[:] = self._state.qpos
-
-    def close(self) -> None:
-        """Nothing is left open."""

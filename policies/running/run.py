@@ -6,6 +6,7 @@ from time import perf_counter
 import numpy as np
 from numpy.typing import ArrayLike
 
+from kinarm.chain import within_limits
 from kinarm.episodes import COLLISION, RUNNING, SUCCESS, Episodes, Outcome
 from kinarm.errors import InvalidInputError, ProblemError, RunStoppedError
 from kinarm.kernels.compiling import Array
@@ -107,7 +108,7 @@ class Run:
         aims = np.array(goals, dtype=float)
         self._check_goals(aims)
         with self.arm.connected(self.rate) as arm:
-            self._told = self._within(arm.read())
+            self._told = self._start(arm.read())
             self._rehearse(aims[0])
             for goal in aims:
                 self._reach(goal)
@@ -121,18 +122,13 @@ class Run:
             goal = goals[int(found.argmin())].tolist()
             raise InvalidInputError(f"the goal {goal} is out of reach, or all around it touches")
 
-    def _within(self, reading: Array) -> Array:
+    def _start(self, reading: Array) -> Array:
         """A reading within the limits, which it may miss by a step."""
-        arm = self.simulator.arm
+        arm, time_step = self.simulator.arm, self.simulator.problem.stepping.time_step
         within = np.clip(reading, arm.lower, arm.upper)
-        limit = arm.velocity_limits * self.simulator.problem.stepping.time_step
-        if (beyond := np.abs(reading - within) > limit).any():
-            joint = int(beyond.argmax())
-            raise InvalidInputError(
-                f"{arm.joint_names[joint]} reads {reading[joint]:.6g}, and its limits are "
-                f"{arm.lower[joint]:.6g} and {arm.upper[joint]:.6g}"
-            )
-        return within
+        near = np.abs(reading - within) <= arm.velocity_limits * time_step
+        start = np.where(near, within, reading)
+        return within_limits("what the arm reads", start, arm.chain, arm.joint_names)
 
     def _rehearse(self, goal: Array) -> None:
         """Refuse a start in contact, and a rate that this machine cannot keep."""
@@ -168,8 +164,8 @@ class Run:
             self._follow(episodes, states, aims)
             states.append(self._settled())
         except RunStoppedError as error:
-            stopped = str(error)
             self.arm.stop()
+            stopped = str(error)
             raise
         except KeyboardInterrupt:
             stopped = "interrupted"

@@ -7,13 +7,13 @@ import numpy as np
 
 from kinarm.errors import InvalidInputError
 from kinarm.kernels.compiling import Array
-from kinarm.policies.running.backend import RealTime
+from kinarm.policies.running.backend import Backend
 
 STEPS = 4095
 """Steps of a servo in a turn, as LeRobot counts them."""
 
 
-class SOArm(RealTime):
+class SOArm(Backend):
     """A follower arm SO-101 of LeRobot; the gripper is left alone.
 
     LeRobot has joints in degrees from the middle of the calibrated range, or
@@ -36,7 +36,6 @@ class SOArm(RealTime):
         "wrist_flex",
         "wrist_roll",
     )
-    rate: float | None = None
 
     def __init__(self, address: str, name: str = "kinarm", *, degrees: bool = True) -> None:
         try:

@@ -6,13 +6,13 @@ import numpy as np
 
 from kinarm.errors import needed
 from kinarm.kernels.compiling import Array
-from kinarm.policies.running.backend import RealTime
+from kinarm.policies.running.backend import Backend
 
 LOOKAHEAD, GAIN = 0.1, 300.0
 """Of ``servoJ``: the time over which it smooths [s], and how hard it follows."""
 
 
-class URArm(RealTime):
+class URArm(Backend):
     """An arm of Universal Robots, commanded by ``servoJ``.
 
     Parameters

@@ -11,17 +11,11 @@ from kinarm.errors import FROM_ZERO, NOT_NEGATIVE, POSITIVE, RunStoppedError
 
 Array = NDArray[np.float64]
 
-WINDOW = 0.1
-"""Time over which speeds are measured [s]."""
+WINDOW, SLACK = 0.1, 0.1
+"""Time over which speeds are measured [s], and by how much they may exceed limits [per s]."""
 
-STALE = 0.25
-"""Time in which readings change if the command does [s]."""
-
-MOVED = 0.05
-"""Way of a command in that time [rad or m]."""
-
-SLACK = 0.1
-"""What a measured speed may exceed its limit by [rad/s or m/s]."""
+STALE, MOVED = 0.25, 0.05
+"""Time in which readings change [s] if the command moves by so much [rad or m]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -64,12 +58,12 @@ class Watchdog:
     def __init__(
         self, limits: SafeLimits, joint_names: tuple[str, ...], fastest: Array, period: float
     ) -> None:
-        self.limits, self._names, self._period = limits, joint_names, period
+        self._limits, self._names = limits, joint_names
         self._fastest = limits.overspeed * fastest + SLACK
-        self._window = max(1, round(WINDOW / period))
-        self._stale = max(2, round(STALE / period))
-        kept = 1 + max(2 * self._window, self._stale)
-        self._read, self._told = deque[Array](maxlen=kept), deque[Array](maxlen=kept)
+        self._window, stale = max(1, round(WINDOW / period)), max(2, round(STALE / period))
+        self._time = self._window * period
+        self._read = deque[Array](maxlen=2 * self._window + 1)
+        self._recent = deque[tuple[Array, Array]](maxlen=stale + 1)
         self._late = 0
 
     def check(self, reading: Array, told: Array, late: float) -> None:
@@ -78,32 +72,29 @@ class Watchdog:
         Raises RunStoppedError.
         """
         self._late = self._late + 1 if late > 0 else 0
-        if self._late > self.limits.late:
+        if self._late > self._limits.late:
             raise RunStoppedError(f"{self._late} cycles in a row were late, at last {late:.3f} s")
-        self._refuse(np.abs(reading - told), self.limits.distance, "from its command")
+        self._refuse(reading - told, self._limits.distance, "from its command")
         self._read.append(reading)
-        self._told.append(told)
-        n, k = len(self._read), self._window
-        if n > k:
-            speed = (reading - self._read[-1 - k]) / (k * self._period)
-            self._refuse(np.abs(speed), self._fastest, "per s, too fast")
-            if self.limits.acceleration and n > 2 * k:
-                before = (self._read[-1 - k] - self._read[-1 - 2 * k]) / (k * self._period)
-                change = np.abs(speed - before) / (k * self._period)
-                self._refuse(change, self.limits.acceleration, "per s^2, too abrupt")
-        if n > self._stale:
-            still = all(np.array_equal(each, reading) for each in self._recent(self._read))
-            if still and np.ptp(np.array(self._recent(self._told)), axis=0).max() > MOVED:
-                raise RunStoppedError(f"readings have not changed for {STALE:g} s, commands have")
-
-    def _recent(self, kept: deque[Array]) -> list[Array]:
-        return list(kept)[-1 - self._stale :]
+        if len(self._read) > self._window:
+            speed = (reading - self._read[-1 - self._window]) / self._time
+            self._refuse(speed, self._fastest, "per s, too fast")
+            if self._limits.acceleration and len(self._read) == self._read.maxlen:
+                before = (self._read[-1 - self._window] - self._read[0]) / self._time
+                change = (speed - before) / self._time
+                self._refuse(change, self._limits.acceleration, "per s^2, too abrupt")
+        self._recent.append((reading, told))
+        seen, commanded = np.ptp(np.array(self._recent), axis=0)
+        full = len(self._recent) == self._recent.maxlen
+        if full and commanded.max() > MOVED and not seen.any():
+            raise RunStoppedError(f"readings have not changed for {STALE:g} s, commands have")
 
     def _refuse(self, values: Array, most: Array | float, what: str) -> None:
-        beyond = values > most
-        if beyond.any():
+        beyond = np.abs(values) - most
+        if (beyond > 0).any():
             joint = int(beyond.argmax())
-            name, limit = self._names[joint], np.broadcast_to(most, values.shape)[joint]
+            value = abs(values[joint])
             raise RunStoppedError(
-                f"{name} is {values[joint]:.3g} {what}; at most {limit:.3g} is allowed"
+                f"{self._names[joint]} is {value:.3g} {what}; "
+                f"at most {value - beyond[joint]:.3g} is allowed"
             )

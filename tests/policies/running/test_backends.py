@@ -10,7 +10,7 @@ from known_arms import INSTALLED
 from kinarm import ReachProblem, Simulator
 from kinarm.errors import InvalidInputError, MissingExtraError, RunStoppedError
 from kinarm.policies import load_policy
-from kinarm.policies.running.backend import RealTime, WiredArm
+from kinarm.policies.running.backend import Backend, WiredArm
 from kinarm.policies.running.check import ContractCheck
 from kinarm.policies.running.mujoco_arm import MujocoArm
 from kinarm.policies.running.run import Run
@@ -23,8 +23,8 @@ from kinarm.world import World
 def no_waiting(monkeypatch):
     """Arms whose time is not the clock's."""
     clock = {"now": 0.0}
-    monkeypatch.setattr(RealTime, "now", lambda self: clock["now"])
-    monkeypatch.setattr(RealTime, "wait", lambda self, until: clock.update(now=until))
+    monkeypatch.setattr(Backend, "now", lambda self: clock["now"])
+    monkeypatch.setattr(Backend, "wait", lambda self, until: clock.update(now=until))
 
 
 class TestMujoco:
@@ -54,8 +54,7 @@ class TestMujoco:
         rng, arm = np.random.default_rng(0), world.arm
         q = rng.uniform(arm.lower, arm.upper, (200, 6)) * [1, 1, 1, 1, 1, 0]
         q = q[world.in_contact(q)][0]
-        wired = WiredArm(MujocoArm(world, arm.home), world).connected(50.0)
-        with wired:
+        with WiredArm(MujocoArm(world, arm.home), world).connected(50.0) as wired:
             wired.command(q)
             with pytest.raises(RunStoppedError, match="the arm stopped, for .* touches "):
                 wired.wait(5.0)
