@@ -1,9 +1,11 @@
 """The check of a contract: errors of all kinds are caught, and none is imagined."""
 
+import re
+
 import numpy as np
 import pytest
 
-from docs.measurements.injections import KINDS, PLACES, distortions, measure
+from docs.measurements.injections import KINDS, measure
 from kinarm.errors import InvalidInputError
 from kinarm.policies.running.backend import WiredArm
 from kinarm.policies.running.check import ContractCheck
@@ -42,8 +44,6 @@ def changed(joint, factor=1.0, shift=0.0):
     ],
 )
 def test_says_what_is_wrong(world, reads, takes, words):
-    import re
-
     assert re.search(words, "\n".join(said(world, reads, takes)))
 
 
@@ -63,20 +63,10 @@ def test_what_does_not_show_at_a_pose_is_said(world):
     assert said(world, changed(0, -1.0), changed(0, -1.0), pose) == []
 
 
-def test_errors_are_undone():
-    """What is injected both ways is one error of the arm."""
-    rng, q = np.random.default_rng(0), np.random.default_rng(1).normal(size=6)
-    for kind in KINDS[:-1]:
-        forth, back = distortions(rng, kind, 6, 5)
-        assert np.abs(forth(q) - q).max() > 0.01
-        np.testing.assert_allclose(back(forth(q)), q, rtol=0, atol=1e-12)
-
-
 def test_injections():
     found = measure("paper", 160, 60)
     assert len(found["tally"]) == 3 * len(KINDS[:-1]) + 2
     assert (found["missed"], found["imagined"]) == ([], [])
-    assert PLACES == ("reading", "command", "both")
 
 
 def test_pose_in_contact(world):

@@ -201,11 +201,6 @@ class TestStops:
         run = make(settings={"speed": 1.0, "limits": SafeLimits(acceleration=1.0)})
         self.check(run, trial[1], "too abrupt")
 
-    def test_contact_of_the_arm(self, make, trial):
-        """The shield does not know what a lagging arm cuts through."""
-        run = make(takes=Told(10, raising(ConnectionError("the arm stopped, for a touches b"))))
-        self.check(run, trial[1], "a touches b")
-
     def test_ctrl_c(self, make, trial):
         run = make(takes=Told(31, raising(KeyboardInterrupt())))
         with pytest.raises(KeyboardInterrupt):
@@ -270,10 +265,6 @@ class TestRefusals:
         other = Simulator(simulator.problem.replace(observation={"history": 2}), threads=1)
         with pytest.raises(InvalidInputError, match="sees a history takes commanded"):
             Run(make().arm, policy, other, measured=True)
-
-    def test_speed(self, make):
-        with pytest.raises(InvalidInputError, match="speed must lie in"):
-            make(settings={"speed": 1.5})
 
     def test_changed_folder(self, policy, tmp_path):
         export_policy(policy, tmp_path / "out", onnx=False)
