@@ -104,13 +104,14 @@ class WiredArm:
                 f"{world.arm.name!r} has {', '.join(world.arm.joint_names)}"
             )
         self.backend, self.now = backend, backend.now
-        self._wiring = wiring or {"sign": 1.0, "offset": 0.0}
+        self._wiring, self._period = wiring or {"sign": 1.0, "offset": 0.0}, 0.0
 
     @contextmanager
     def connected(self, rate: float) -> Iterator[Self]:
         """The arm, to be commanded at a rate [Hz]; it is at rest afterwards."""
+        self._period = 1.0 / rate
         try:
-            self._asked(self.backend.connect, 1.0 / rate)
+            self._asked(self.backend.connect, self._period)
             try:
                 yield self
             finally:
@@ -133,6 +134,15 @@ class WiredArm:
     def wait(self, until: float) -> None:
         """Wait until a time of the arm [s]."""
         self._asked(self.backend.wait, until)
+
+    def followed(self, commands: Array) -> Array:
+        """Command joint positions, a cycle each; readings after each, shape (n, n_joints)."""
+        readings = []
+        for told in commands:
+            self.command(told)
+            self.wait(self.now() + self._period)
+            readings.append(self.read())
+        return np.array(readings)
 
     def stop(self) -> None:
         """Come to rest where the arm is, if it still answers."""

@@ -104,7 +104,7 @@ class ContractCheck:
     def _restless(self) -> list[str]:
         """A joint that moves when it is told to stay where it reads, if any."""
         for _ in range(round(REST * self.rate)):
-            moved = np.abs(self._followed(self._held[None])[0] - self._held)[: len(self._moves)]
+            moved = np.abs(self.arm.followed(self._held[None])[0] - self._held)[: len(self._moves)]
             if (moved > STAYS).any():
                 joint = int(moved.argmax())
                 said = f"{self._names[joint]} moves by {moved[joint]:.3f} when it is told to stay"
@@ -115,16 +115,16 @@ class ContractCheck:
         """The first joint that answers otherwise than it is told, if any."""
         rest = round(REST * self.rate)
         for joint, way in enumerate(self._moves):
-            home = self._followed(np.tile(self._held, (READINGS, 1))).mean(axis=0)
+            home = self.arm.followed(np.tile(self._held, (READINGS, 1))).mean(axis=0)
             step = way * (np.arange(len(home)) == joint)
             told = np.concatenate([home + self._ramp * step, np.tile(home + step, (rest, 1))])
-            seen = self._followed(told)
+            seen = self.arm.followed(told)
             answer = (seen[-READINGS:].mean(axis=0) - home)[: len(self._moves)]
             lag = float((told - seen)[:, joint].sum()) / way / self.rate
             if wrong := self._wrong(joint, way, answer, lag):
                 return [wrong]
-            self._followed(home + self._ramp[::-1] * step)
-            self._followed(np.tile(self._held, (rest, 1)))
+            self.arm.followed(home + self._ramp[::-1] * step)
+            self.arm.followed(np.tile(self._held, (rest, 1)))
         return []
 
     def _wrong(self, joint: int, way: float, answer: Array, lag: float) -> str:
@@ -139,12 +139,3 @@ class ContractCheck:
         if abs(share - 1.0) > OFF:
             return f"{said}: its {'sign' if abs(share + 1.0) < 0.3 else 'scale'}"
         return f"{name} reads what it had {lag:.2f} s before: stale" if lag > LAG else ""
-
-    def _followed(self, commands: Array) -> Array:
-        """Readings a cycle after each command, shape (n, n_joints) [rad or m]."""
-        readings = []
-        for told in commands:
-            self.arm.command(told)
-            self.arm.wait(self.arm.now() + 1.0 / self.rate)
-            readings.append(self.arm.read())
-        return np.array(readings)

@@ -202,16 +202,12 @@ class Run:
 
     def _settled(self) -> Array:
         """Hold the last command until the joints rest; where they do."""
-        arm, before = self.arm, self.arm.read()
+        hold = np.tile(self._told, (max(2, round(SETTLED * self.rate)), 1))
         for _ in range(round(LONGEST_REST / SETTLED)):
-            for _ in range(max(1, round(SETTLED * self.rate))):
-                arm.command(self._told)
-                arm.wait(arm.now() + 1.0 / self.rate)
-            reading = arm.read()
-            if np.abs(reading - before).max() < REST:
-                return reading
-            before = reading
-        return before
+            seen = self.arm.followed(hold)
+            if np.abs(seen[-1] - seen[0]).max() < REST:
+                break
+        return np.array(seen[-1])
 
     def _recording(
         self, goal: Array, episodes: Episodes, path: Array, aims: Array, stopped: str

@@ -1,5 +1,6 @@
 """The ROS 2 node of the docs, beside a fake ``rclpy``: it brings an arm to the goal."""
 
+import ast
 import runpy
 import shutil
 import sys
@@ -73,6 +74,10 @@ def say(node, q, at):
     """Publish joint states, in another order."""
     FakeNode.now = at
     node.listener(SimpleNamespace(name=list(reversed(node.names)), position=list(q[::-1])))
+
+
+def test_is_python_3_9():
+    ast.parse(NODE.read_text(), feature_version=(3, 9))
 
 
 def test_reaches_the_goal(node):
