@@ -43,6 +43,14 @@ class ArmOptions(ProblemOptions):
     address: str | None = None
     rate: float | None = field(default=None, metadata=POSITIVE)
 
+    DEFAULTS: ClassVar = {
+        **ProblemOptions.DEFAULTS,
+        "problem": "what the policy was trained for",
+        "plant": "ideal; a real arm has its own",
+        "feedback": "commanded",
+        "rate": "what the arm wants, or the policy's",
+    }
+
     def faced(self) -> "tuple[Policy, Simulator, Mapping[str, Any] | None]":
         """Policy, simulator without a plant, and the contract's signs and offsets, if any."""
         from kinarm.evaluation.finding import find_contestants
@@ -124,13 +132,6 @@ class RunRequest(ArmOptions):
         "output": "record overwrite",
         **ProblemOptions.GROUPS,
     }
-    DEFAULTS: ClassVar = {
-        **ProblemOptions.DEFAULTS,
-        "problem": "what the policy was trained for",
-        "plant": "ideal; a real arm has its own",
-        "feedback": "commanded",
-        "rate": "what the arm wants, or the policy's",
-    }
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -144,12 +145,6 @@ class CheckRequest(ArmOptions):
     """
 
     at: tuple[str, ...] = field(default=("home",), metadata={"metavar": "home|Q"})
-
-    GROUPS: ClassVar = {
-        "the arm": "policy backend address rate at",
-        **ProblemOptions.GROUPS,
-    }
-    DEFAULTS: ClassVar = {**RunRequest.DEFAULTS, "rate": "what the arm wants, or 50"}
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
@@ -225,7 +220,7 @@ def _check(request: CheckRequest, _: str) -> None:
     if request.at != ("home",):
         pose = finite_array("--at", request.at, pose.shape)
     arm = request.arm_of(simulator, wiring, pose)
-    rate = request.rate or arm.backend.rate or 50.0
+    rate = request.rate or arm.backend.rate or 1.0 / simulator.problem.stepping.time_step
     check = ContractCheck(arm, simulator.world, pose, rate)
     wrong = check.run()
     for line in wrong:
@@ -235,7 +230,3 @@ def _check(request: CheckRequest, _: str) -> None:
     print("passed: joints read what they have at the pose, and move as they are told")
     for line in check.unseen():
         print(f"not seen at this pose: {line}")
-
-
-if __name__ == "__main__":
-    main()
