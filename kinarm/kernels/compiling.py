@@ -20,7 +20,8 @@ from typing import Any, TypeVar, cast
 import llvmlite
 import numpy as np
 from numba import njit, types
-from numba.core.caching import FunctionCache
+from numba.core import config
+from numba.core.caching import FunctionCache, IndexDataCacheFile
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import Compiler
 from numpy.typing import NDArray
@@ -138,13 +139,14 @@ class HelperCompiler(KernelCompiler):
 class KernelCache(FunctionCache):
     """A kernel's machine code on disk; what cannot be read costs only time.
 
-    Processes with the same sources and versions of Numba and llvmlite share it.
+    Processes with the same sources and versions of Numba and llvmlite share it; with the variable
+    ``NUMBA_CACHE_DIR`` also those of other installations.
     """
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
         """Look machine code up; None if it is missing or damaged."""
         try:
-            self._cache_file._source_stamp = self._key
+            self._cache_file = self._file
             return super().load_overload(sig, target_context)
         except Exception:  # a damaged file can raise anything
             with suppress(Exception):
@@ -157,9 +159,13 @@ class KernelCache(FunctionCache):
             super().save_overload(sig, data)
 
     @cached_property
-    def _key(self) -> str:
+    def _file(self) -> IndexDataCacheFile:
         # The kernel's module is complete by now.
-        return compiled_in(self._py_func.__module__)
+        key, folder = compiled_in(self._py_func.__module__), Path(self._cache_path)
+        if config.CACHE_DIR:
+            folder = Path(config.CACHE_DIR, f"kinarm-{key[:16]}")
+            folder.mkdir(parents=True, exist_ok=True)
+        return IndexDataCacheFile(str(folder), self._impl.filename_base, key)
 
 
 @cache

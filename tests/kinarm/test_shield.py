@@ -89,6 +89,8 @@ def test_a_replacement_is_nearer_than_any_share_that_is_free():
     episodes, world = simulator.reset(starts, goals), World("right")
     actions = held_actions(simulator, rng, 300)
     for step in range(40):
+        if found > 60:
+            break
         before, count = episodes.q.copy(), episodes.interventions.copy()
         simulator.step(episodes, actions[:, step])
         for row in np.flatnonzero(episodes.interventions > count):

@@ -1,6 +1,7 @@
 """Kernels are found in Numba's cache if nothing has changed, and work whatever happens to it."""
 
 import os
+import shutil
 import subprocess
 import sys
 
@@ -60,10 +61,11 @@ def value_of_one(package):
     """Call the kernel in another process: its value for 1, and whether it was in the cache."""
     folders = {"NUMBA_CACHE_DIR": package.parent / "cache", "PYTHONPATH": package.parent}
 
-    def call(*arguments):
+    def call(*arguments, **moved):
+        variables = {name: str(folder) for name, folder in (folders | moved).items()}
         done = subprocess.run(
             [sys.executable, "-c", SCRIPT, *arguments],
-            env={**os.environ, **{name: str(folder) for name, folder in folders.items()}},
+            env={**os.environ, **variables},
             capture_output=True,
             text=True,
             check=False,
@@ -99,6 +101,13 @@ def test_machine_code_is_as_fresh_as_all_that_is_compiled_in(package, value_of_o
     assert change("kernels/other.py", "", "UNUSED = 1\n") == (40.0, True)
     assert change("kernels/inner.py", "1.0", "2.0") == (60.0, False)
     assert change("constants.py", "2.0", "3.0") == (90.0, False)
+
+
+def test_copies_of_the_sources_share_it(package, value_of_one):
+    assert value_of_one() == (40.0, False)
+    elsewhere = package.parent / "elsewhere"
+    shutil.copytree(package, elsewhere / "arm")
+    assert value_of_one(PYTHONPATH=elsewhere) == (40.0, True)
 
 
 def test_versions_of_numba_that_are_not_known_are_refused_in_one_line():
