@@ -10,6 +10,7 @@ of all files whose helpers and constants are compiled in.
 
 import gc
 import hashlib
+import os
 import sys
 from collections.abc import Callable
 from contextlib import suppress
@@ -20,7 +21,6 @@ from typing import Any, TypeVar, cast
 import llvmlite
 import numpy as np
 from numba import njit, types
-from numba.core import config
 from numba.core.caching import FunctionCache, IndexDataCacheFile
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import Compiler
@@ -162,8 +162,8 @@ class KernelCache(FunctionCache):
     def _file(self) -> IndexDataCacheFile:
         # The kernel's module is complete by now.
         key, folder = compiled_in(self._py_func.__module__), Path(self._cache_path)
-        if config.CACHE_DIR:
-            folder = Path(config.CACHE_DIR, f"kinarm-{key[:16]}")
+        if shared := os.environ.get("NUMBA_CACHE_DIR"):
+            folder = Path(shared, f"kinarm-{key[:16]}")
             folder.mkdir(parents=True, exist_ok=True)
         return IndexDataCacheFile(str(folder), self._impl.filename_base, key)
 
