@@ -42,6 +42,7 @@ SYMBOLS = {
     "bᵢ": "bound of trial i: steps that the oracle proves to be necessary",
     "gᵢ": "goals that trial i reached",
     "rᵢ": "error of the goal's direction, rotation or joints at the end of trial i [rad]",
+    "zᵢ": "steps of trial i that a shield replaced",
     "aᵢ": "closest approach of trial i, if success does not end it [m]",
     "eᵢ": f"largest distance after the last {HOLDING_STEPS} steps of that longer trial [m]",
     "H": "set of these longer trials that touch something",

@@ -31,6 +31,12 @@ NEVER = sys.float_info.min
 SHIELDED = "+shield"
 """What the name of a shielded contestant has more."""
 
+
+def bare_name(name: str) -> str:
+    """The name of a contestant without its shield."""
+    return name.replace(SHIELDED, "", 1)
+
+
 AIM = 0.005
 """How close the oracle aims where success does not end trials [m]."""
 
@@ -81,7 +87,12 @@ class Contestant:
     has_shield: bool = False
 
     def shielded(self) -> "Contestant":
-        """The same behind a shield (``kinarm.shield``), under a name of its own."""
+        """The same behind a shield (``kinarm.shield``), under a name of its own.
+
+        What is not trained stays as it is.
+        """
+        if self.has_shield or self in UNTRAINED.values():
+            return self
         group = group_of(self.name)
         return replace(
             self,
@@ -172,7 +183,7 @@ class Contestant:
             The file that it was read from.
         """
         made = policy.provenance
-        return cls(
+        entered = cls(
             name,
             partial(_run, policy),
             made.algorithm,
@@ -182,6 +193,7 @@ class Contestant:
             source,
             actor=Actor(policy),
         )
+        return entered.shielded() if policy.shield else entered
 
     @classmethod
     def from_function(cls, name: str, function: "PolicyFunction | Predictor") -> "Contestant":

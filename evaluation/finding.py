@@ -10,7 +10,7 @@ from typing import Any
 
 from kinarm._files import first_line
 from kinarm.errors import InvalidInputError, UnknownNameError
-from kinarm.evaluation.contestants import UNTRAINED, Contestant, Predictor
+from kinarm.evaluation.contestants import SHIELDED, UNTRAINED, Contestant, Predictor, bare_name
 from kinarm.evaluation.predictors import Actor, Wrapper
 from kinarm.networks import PolicyFunction
 from kinarm.policies.conversion.models import saved_model
@@ -35,7 +35,8 @@ def find_contestants(
         A baseline, ``"oracle"``, a shipped policy, a group of them (all
         training seeds), ``"best"``, a policy file, a model of Stable-Baselines3
         (.zip), a folder of either, or ``"module:function"``. A model and a
-        module run code: open only those that you trust.
+        module run code: open only those that you trust. ``+shield`` in a name
+        means the same policies behind a shield.
     problem : ReachProblem, str or Path, optional
         What a model is for, as its file does not say, or the best shipped
         policy; others say it themselves.
@@ -49,6 +50,9 @@ def find_contestants(
         of Stable-Baselines3.
     """
     text = str(name_or_file)
+    if SHIELDED in text and not Path(text).exists():
+        bare = find_contestants(bare_name(text), problem, vec_normalize, wrapper)
+        return tuple(each.shielded() for each in bare)
     models = [Path(text)] if text.endswith(".zip") else models_in(Path(text))
     if text in UNTRAINED:
         found: tuple[Contestant, ...] = (UNTRAINED[text],)

@@ -178,6 +178,17 @@ METRICS: dict[str, Metric] = {
         heading="collision %",
         priority=14.5,
     ),
+    "replaced": Metric(
+        meaning="share of the steps of all trials that a shield replaced",
+        definition="Σ zᵢ / Σ kᵢ",
+        formula=lambda trials: (
+            trials.interventions.sum() / trials.steps.sum() if len(trials.interventions) else None
+        ),
+        unit="%",
+        heading="replaced %",
+        digits=2,
+        priority=14.2,
+    ),
     "early_collision": _share_of(
         f"that ended in contact within the first {EARLY_STEPS} steps",
         f"|{{i ∈ C : kᵢ ≤ {EARLY_STEPS}}}| / n",

@@ -121,6 +121,7 @@ class Outcomes:
     collision = _joined("rollouts", "collision", "Whether a trial ended in contact.")
     turn = _joined("rollouts", "turn", "Final errors of the goals' rests; empty if they have none.")
     goals_reached = _joined("rollouts", "goals_reached", "Goals reached; empty if not counted.")
+    interventions = _joined("rollouts", "interventions", "Replaced steps; empty without shield.")
     closest = _joined("holding", "closest", "Closest approaches where success ends no trial [m].")
     farthest_at_end = _joined("holding", "farthest_at_end", "Largest last distances there [m].")
     holding_collision = _joined("holding", "collision", "Whether trials ended in contact there.")

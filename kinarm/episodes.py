@@ -179,8 +179,8 @@ class Episodes(NamedTuple):
     projected : ndarray, shape (n, n_actuated + 2)
         Its projection off what it touches, how far that is, and how often it was
         projected.
-    interventions, replaced : ndarray of int, shape (n,), and (n, horizon) or (0, horizon)
-        Steps that the shield replaced, and the pairs that these would have
+    interventions, replaced : ndarray of int, shape (n,), and (n, horizon), or of no rows
+        Steps that a shield replaced, and the pairs that these would have
         touched, from 1; -1 if that is not known, and 0 for other steps.
     """
 

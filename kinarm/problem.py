@@ -66,8 +66,6 @@ class ReachProblem(Checked):
         available = [region.name for region in self.scene.goal_regions]
         if not available:
             raise ProblemError("a scene needs at least one goal region")
-        if self.stepping.shield and not self.plant.ideal:
-            raise ProblemError("a shield knows joints that obey at once: it needs an ideal plant")
         if not self.task.goal_regions:
             object.__setattr__(self, "task", replace(self.task, goal_regions=tuple(available)))
         for name in self.task.goal_regions:

@@ -54,6 +54,9 @@ class Recording:
         Configuration of the refused move at which they touch first [rad or m].
     goals : ndarray, shape (steps + 1, goal_width), optional
         Goals at each configuration, if they move or follow each other.
+    replaced : tuple, optional
+        Steps that a shield replaced, from 0, each with the names of the two
+        bodies that would have touched, or None if that is not known.
     steps_lower_bound : int, optional
         Proven: no motion reaches the goal in fewer steps.
     provenance : dict
@@ -77,6 +80,7 @@ class Recording:
     contact_point: NDArray[np.float64] | None = None
     refused: NDArray[np.float64] | None = None
     goals: NDArray[np.float64] | None = None
+    replaced: tuple[tuple[int, tuple[str, str] | None], ...] = ()
     steps_lower_bound: int | None = None
     provenance: Mapping[str, Any] = field(default_factory=dict)
 
@@ -173,6 +177,8 @@ def load_recordings(path: str | Path) -> list[Recording]:
             given |= {name: archive.arrays.get(f"{name}_{number}") for name in ARRAYS}
             if given["contact"] is not None:
                 given["contact"] = tuple(given["contact"])
+            shielded = given.get("replaced", ())
+            given["replaced"] = tuple((step, pair and tuple(pair)) for step, pair in shielded)
             recordings.append(Recording(**given))
         return recordings
 
@@ -236,11 +242,24 @@ def record_rollouts(
                 contact=touch.pair if touch else None,
                 contact_point=touch.point if touch else None,
                 refused=touch.configuration if touch else None,
+                replaced=_replaced_steps(world, rollouts, number),
                 steps_lower_bound=steps_lower_bound(number) if steps_lower_bound else None,
                 provenance=dict(provenance or {}),
             )
         )
     return recordings
+
+
+def _replaced_steps(
+    world: World, rollouts: Rollouts, number: int
+) -> tuple[tuple[int, tuple[str, str] | None], ...]:
+    """Steps of a rollout that a shield replaced, and what would have touched."""
+    if not len(rollouts.replaced):
+        return ()
+    pairs, names = rollouts.replaced[number].tolist(), world.contact_model.pair_names
+    return tuple(
+        (step, names[pair - 1] if pair > 0 else None) for step, pair in enumerate(pairs) if pair
+    )
 
 
 def record_path(

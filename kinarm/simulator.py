@@ -198,6 +198,7 @@ class Simulator(EpisodeRunner):
             ``networks()`` run compiled; a function from observations (n,
             n_observations) to actions (n, n_actions) is called once a step for
             the running episodes; if it takes ``rows``, it gets their numbers.
+            One with the attribute ``shield`` acts behind a shield.
         starts, goals, record
             As for `reset`.
         policy_index : array_like of int, shape (n,), optional
@@ -205,6 +206,9 @@ class Simulator(EpisodeRunner):
         shift : ndarray, shape (n_observations,), optional
             Collect moments of the observations about it.
         """
+        if getattr(policies, "shield", False) and not self.problem.stepping.shield:
+            given = policies, starts, goals
+            return self.shielded().rollout(*given, record=record, shift=shift)
         q, goal = self.world.check_scenarios(starts, goals)
         if shift is not None:
             shift = finite_array("shift", shift, (self.n_observations,))

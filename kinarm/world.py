@@ -215,6 +215,7 @@ class World(GoalKinematics, StepContact, WorldChanges):
         horizon, n_observations = self.rules.horizon, self.n_observations
         shapes = self.contact_model.shapes
         own_scenes = self.has_random_bodies or len(shapes.moving) > 0
+        shielded = len(self.rules.shield) > 0
         plants = np.zeros((n if self.plants.width else 0, self.plants.width))
         return Episodes(
             status=np.zeros(n, dtype=np.int64),
@@ -242,8 +243,8 @@ class World(GoalKinematics, StepContact, WorldChanges):
             tried=np.zeros(n),
             blocker=np.zeros(n, dtype=np.int64),
             projected=np.zeros((n, self.n_actions + 2)),
-            interventions=np.zeros(n, dtype=np.int64),
-            replaced=np.zeros((n if record else 0, horizon), dtype=np.int64),
+            interventions=np.zeros(n if shielded else 0, dtype=np.int64),
+            replaced=np.zeros((n if shielded and record else 0, horizon), dtype=np.int64),
             path=np.full((n, horizon + 1, n_joints) if record else (0, 0, n_joints), np.nan),
         )
 

@@ -50,6 +50,8 @@ class Policy:
         ``"silu"``; by default tanh between the layers and none after the last.
     mirror : Mirror, optional
         Reflection in which it sees goals on the left, and acts.
+    shield : bool
+        Whether a simulator replaces its steps that would touch; see `shielded`.
     """
 
     mean: NDArray[np.float64]
@@ -58,6 +60,7 @@ class Policy:
     provenance: Provenance
     activations: tuple[Activation, ...] = ()
     mirror: Mirror | None = None
+    shield: bool = False
 
     def __post_init__(self) -> None:
         if not self.layers:
@@ -242,6 +245,15 @@ class Policy:
 
         return network_module(policy_content(self).arrays, self.activations, self.mirror)
 
+    def shielded(self) -> "Policy":
+        """The same policy behind a shield: what would touch is replaced wherever it is rolled out.
+
+        `kinarm.Simulator.rollout`, evaluations and replays do so, under a name with ``+shield``. In
+        other environments, whose own `kinarm.Simulator.shielded` or ``shield=True`` decides,
+        it acts as before.
+        """
+        return replace(self, shield=True)
+
     def check_arm(self, arm: Arm) -> None:
         """Refuse an arm that the simulator treats otherwise than its own."""
         trained = self.problem.arm
@@ -284,6 +296,7 @@ def policy_content(policy: Policy) -> Archive:
         "provenance": policy.provenance.to_json(),
         "observation": observation_layout(policy.problem),
         "activations": list(policy.activations),
+        **({"shield": True} if policy.shield else {}),
     }
     arrays = {"mean": policy.mean, "std": policy.std}
     for number, layer in enumerate(policy.layers):
@@ -312,6 +325,7 @@ def policy_of_content(content: Archive, where: str) -> Policy:
         layers=tuple(Layer(arrays[f"weights_{k}"], arrays[f"bias_{k}"]) for k in range(n_layers)),
         provenance=provenance,
         activations=tuple(header["activations"]),
+        shield=header.get("shield", False),
     )
     signs = [f"mirror_{name}" for name in SIGNS]
     if not any(name in arrays for name in signs):

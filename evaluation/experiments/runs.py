@@ -46,9 +46,9 @@ class TrialOutcomes(NamedTuple):
         Sums of rewards.
     success, collision : ndarray of bool
         How the trials ended.
-    turn, goals_reached : ndarray
-        Final errors of the goals' rests [rad, or rad or m], and goals reached; or
-        empty.
+    turn, goals_reached, interventions : ndarray
+        Final errors of the goals' rests [rad, or rad or m], goals reached, and
+        steps that a shield replaced; or empty.
     """
 
     distance: NDArray[np.float64]
@@ -58,6 +58,7 @@ class TrialOutcomes(NamedTuple):
     collision: NDArray[np.bool_]
     turn: NDArray[np.float64] = np.zeros(0)
     goals_reached: NDArray[np.int64] = np.zeros(0, dtype=np.int64)
+    interventions: NDArray[np.int64] = np.zeros(0, dtype=np.int64)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from kinarm.errors import InvalidInputError, UnknownNameError
 from kinarm.evaluation.bounds import oracle_bounds
-from kinarm.evaluation.contestants import ORACLE, UNTRAINED, Contestant
+from kinarm.evaluation.contestants import ORACLE, UNTRAINED, Contestant, bare_name
 from kinarm.evaluation.document import EvaluationDocument, Result
 from kinarm.evaluation.finding import check_normalizing, find_contestants, is_import_path
 from kinarm.evaluation.outcomes import failure_causes
@@ -176,6 +176,8 @@ def named_contestants(
     stated = request.resolve() if named or BEST in names else None
     contestants = [_first_contestant(name, stated, request) for name in names]
     check_normalizing(contestants, request.vec_normalize)
+    if request.shield:
+        contestants = [each.shielded() for each in contestants]
     if stated is not None:
         return contestants, stated
     trained = [contestant.problem for contestant in contestants if contestant.problem is not None]
@@ -204,7 +206,8 @@ def _evaluated_candidates(
     chosen = []
     for name in names:
         contestant = None
-        if name is not None and (Path(name).suffix in (".npz", ".zip") or is_import_path(name)):
+        bare = bare_name(name or "")
+        if Path(bare).suffix in (".npz", ".zip") or is_import_path(bare):
             faced = problem or next(iter(document.protocol.problems))
             contestant = _first_contestant(name, document.problem(faced), request)
             # An evaluation calls it by its folder, too, if others have its name.
@@ -215,7 +218,8 @@ def _evaluated_candidates(
         row = document.result(name, problem)
         problem = row.problem
         if contestant is None:
-            if row.policy not in (*UNTRAINED, *policy_names()) and not is_import_path(row.policy):
+            bare = bare_name(row.policy)
+            if bare not in (*UNTRAINED, *policy_names()) and not is_import_path(bare):
                 raise InvalidInputError(
                     f"policy {row.policy!r} of {str(path)!r} is a file: name it with --policy"
                 )

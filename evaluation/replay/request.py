@@ -4,7 +4,7 @@ import webbrowser
 from collections import Counter
 from collections.abc import Callable
 from contextlib import suppress
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, fields, replace
 from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING, ClassVar
@@ -16,6 +16,7 @@ from kinarm._console import working
 from kinarm._files import check_output
 from kinarm.errors import FROM_ZERO, InvalidInputError
 from kinarm.evaluation.request import policy_choices
+from kinarm.problem import ProblemLike, ReachProblem
 from kinarm.problem_options import ProblemOptions, say_choices
 
 if TYPE_CHECKING:
@@ -151,6 +152,10 @@ class ReplayRequest(ProblemOptions):
         elif self.source is not None:
             self._refuse("a file of recordings", "vec_normalize wrapper")
 
+    def resolve(self, default: ProblemLike = "right") -> ReachProblem:
+        """The problem that the options make of a default; a shield is the policies' own."""
+        return super(ReplayRequest, replace(self, shield=False)).resolve(default)
+
     def _refuse(self, mode: str, names: str) -> None:
         for option in self._given(names):
             raise InvalidInputError(f"{option} does not go with {mode}")
@@ -270,7 +275,9 @@ def described(recording: "Recording") -> str:
     }[recording.outcome]
     floor = recording.steps_lower_bound
     necessary = f" ({floor} proven necessary)" if floor is not None else ""
+    shielded = f", {n} replaced by the shield" if (n := len(recording.replaced)) else ""
     return (
         f"{recording.problem.name} {recording.trial}, {recording.policy}: {ending} after "
-        f"{recording.steps} steps{necessary}, {recording.final_distance:.3f} m from the goal"
+        f"{recording.steps} steps{necessary}{shielded}, {recording.final_distance:.3f} m "
+        "from the goal"
     )

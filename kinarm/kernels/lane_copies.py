@@ -51,14 +51,27 @@ def moving_frame(shapes: ContactShapes, k: int, poses: Array) -> int:
 
 @inlined
 def move_bodies(
-    e: int, step: int, lane: int, shapes: ContactShapes, rules: Rules, scenes: Array, poses: Array
+    e: int,
+    step: int,
+    lane: int,
+    shapes: ContactShapes,
+    rules: Rules,
+    scenes: Array,
+    poses: Array,
+    gone: float = 0.0,
 ) -> None:
-    """Put an episode's moving bodies where they are after so many steps, in a lane of poses."""
+    """Put an episode's moving bodies where they are after so many steps, in a lane of poses.
+
+    Or where they would be if they had ``gone`` on as in the last of these, for as many more.
+    """
     numbers = as_numbers(poses)
     for k in range(shapes.moving.shape[0]):
         body, frame = shapes.moving[k], moving_frame(shapes, k, poses)
         for i in range(3):
-            numbers[frame, 13 + i, lane] = scenes[e, body, 13 + i] + rules.moves[step, k, i]
+            place = rules.moves[step, k, i]
+            if gone > 0.0:
+                place += gone * (place - rules.moves[step - 1, k, i])
+            numbers[frame, 13 + i, lane] = scenes[e, body, 13 + i] + place
 
 
 @inlined

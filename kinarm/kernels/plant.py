@@ -26,13 +26,15 @@ SUBSTEPS = 5
 """Parts of a step in which limits of velocity, acceleration and jerk hold."""
 
 DELAY, RESOLUTION, NOISE, GOAL_NOISE, HIGH_BITS, LOW_BITS = range(6)
-SERVO, MOST_CHANGE, TRAPEZE, BRAKE, JERK, EASE = 6, 10, 11, 12, 13, 14
-OFFSETS = 15
+SERVO, MOST_CHANGE, TRAPEZE, BRAKE, JERK, EASE, RATE, STEADY = 6, 10, 11, 12, 13, 14, 15, 16
+OFFSETS = 17
 """Entries of an episode's plant: delay [steps], resolution, standard deviations of noise, and the
 bits of its random state; the servo's matrix for a part of a step, most change of velocity in one,
 and how much of that change the part's way lacks. Of joints without servos, else 0: most change of
 a part's way, most change of the change of velocity, and what a limit of jerk takes off a part's way
-before a stop. Then follow bias and calibration of each joint, and the goal's bias."""
+before a stop. `kinarm.kernels.shield` knows the servo's natural frequency [1/s], and how fast the
+joints may swing without meeting those limits. Then follow bias and calibration of each joint, and
+the goal's bias."""
 
 COMMAND, VELOCITY, CHANGE, FORMER = range(4)
 """Rows of an episode's drive: command, velocity, its change in the last part of a step, and former
@@ -81,6 +83,7 @@ def draw_plants(
         plant[BRAKE] = acceleration * part * part if limited and bandwidth == 0.0 else 0.0
         plant[JERK] = jerk * part * part
         plant[EASE] = 0.5 * acceleration * acceleration / jerk * part if jerk > 0.0 else 0.0
+        fill_calm(plant, draws.order, bandwidth, damping, part)
         for kind in range(2):
             for axis in range(n_actuated):
                 offset = drawn[7 + kind] * (2.0 * uniform(state) - 1.0)
@@ -118,6 +121,21 @@ def fill_servo(plant: Array, order: int, bandwidth: float, damping: float, part:
 
 
 @inlined
+def fill_calm(plant: Array, order: int, bandwidth: float, damping: float, part: float) -> None:
+    """Fill in the rate of the joints' swing, and up to which speed no limit acts on it.
+
+    A servo of second order accelerates by at most rate^2 |e| + 2 damping rate |v|; others change
+    their velocity by at most |v| + rate |e| at once.
+    """
+    servo = bandwidth > 0.0 and plant[SERVO] != 0.0
+    plant[RATE] = 6.283185307179586 * bandwidth if servo else 1.0 / part
+    gain = plant[RATE] * part * (1.0 + 2.0 * damping) if servo and order == 2 else 2.0
+    plant[STEADY] = plant[MOST_CHANGE] / gain
+    if plant[JERK] > 0.0:
+        plant[STEADY] = min(plant[STEADY], 0.25 * plant[JERK])
+
+
+@inlined
 def move_joints(chain: Chain, rules: Rules, fresh: bool, block: Block) -> None:
     """Command the joints of a block, and fill in where they are at the step's end."""
     plant, drive = block.plant, block.drive
@@ -132,6 +150,8 @@ def move_joints(chain: Chain, rules: Rules, fresh: bool, block: Block) -> None:
         resolution = plant[0, RESOLUTION]
         whole = nearest_whole(command / resolution) * resolution
         command = select(resolution > 0.0, whole, command)
+        if block.holds.shape[0] > 0:
+            command = select(block.holds[0] > 0.0, drive[COMMAND, axis], command)
         for k in range(longest - 1, 0, -1):
             older, later = drive[FORMER + k, axis], drive[FORMER + k - 1, axis]
             drive[FORMER + k, axis] = select(fresh, later, older)

@@ -4,31 +4,23 @@ Numbers of an episode depend on its inputs alone. A step that is not proven free
 until Coal has decided.
 """
 
-import math
-
 import numpy as np
 from numpy.typing import NDArray
 
 from kinarm.episodes import COLLISION, PAUSED, RUNNING, SUCCESS, TRUNCATED, Episodes, Rules
 from kinarm.kernels.arriving import arrive, measure, put_goal
+from kinarm.kernels.block_proof import doubtful_steps
 from kinarm.kernels.compiling import Array, inlined, lean_kernel
-from kinarm.kernels.kinematics import forward_kinematics, place_bodies
+from kinarm.kernels.kinematics import forward_kinematics
 from kinarm.kernels.lane_copies import move_bodies, put, put_scene, take, take_rows
 from kinarm.kernels.lanes import LANES, any_lane, as_numbers, lane_bits, select
 from kinarm.kernels.network import choose_actions, shared_policy
 from kinarm.kernels.planes import GAP
 from kinarm.kernels.plant import COMMAND, move_joints, rest, sense
-from kinarm.kernels.proof import (
-    first_contact,
-    is_apart,
-    prove_alone,
-    prove_configurations,
-    prove_step,
-    renew_planes,
-)
+from kinarm.kernels.proof import prove_configurations
 from kinarm.kernels.reward import ROTATION, add_reward, observe, remember
 from kinarm.kernels.session import Session, load_episode, store_episode, take_number
-from kinarm.kernels.shield import fails_again, replace_step, take_down
+from kinarm.kernels.shield import fails_again, is_stuck, replace_step, take_down, unsafe_stops
 
 
 @lean_kernel
@@ -83,7 +75,9 @@ def begin(counters: NDArray[np.int64], session: Session, rows: NDArray[np.int64]
             episodes.status[e] = RUNNING if free >> lane & 1 else PAUSED
             n_paused += 0 if free >> lane & 1 else 1
             episodes.total[e] = 0.0
-            episodes.attempt[e] = episodes.interventions[e] = 0
+            episodes.attempt[e] = 0
+            if episodes.interventions.shape[0] > 0:
+                episodes.interventions[e] = 0
             episodes.cleared[e] = False
             episodes.distance[e] = distances[0, lane]
             for term in range(episodes.terms.shape[1]):
@@ -116,6 +110,7 @@ def advance(counters: NDArray[np.int64], session: Session) -> int:
     block, alone = session.block, session.alone
     lower, upper, row = chain.lower, chain.upper, block.row
     again, shielded = block.again, rules.shield.shape[0] > 0
+    looks = block.holds.shape[0] > 0
     n_joints, n_actuated = episodes.q.shape[1], rules.step_limit.shape[0]
     n_episodes, n_pairs = episodes.status.shape[0], shapes.planes.shape[0]
     shared, summed = shared_policy(n_episodes, control), block.moments.shape[1]
@@ -153,6 +148,10 @@ def advance(counters: NDArray[np.int64], session: Session) -> int:
             centred = select(wanted, block.observation[0, i] - episodes.shift[i], 0.0)
             block.moments[0, i] += centred
             block.moments[1, i] += centred * centred
+        if looks:
+            for k in range(block.former_drive.shape[0]):
+                for axis in range(n_actuated):
+                    block.former_drive[k, axis] = block.drive[k, axis]
         if block.plant.shape[0] > 0:
             move_joints(chain, rules, fresh, block)
         else:
@@ -168,40 +167,38 @@ def advance(counters: NDArray[np.int64], session: Session) -> int:
                 if row[lane] >= 0:
                     step = int(as_numbers(block.steps)[0, lane]) + 1
                     move_bodies(row[lane], step, lane, shapes, rules, episodes.scenes, poses)
-        unproven = ~is_apart(prove_step(shapes, rules.tested, poses, block)) & fresh
-        if any_lane(unproven):
-            if changed:
-                forward_kinematics(chain, block.q, 0, before)
-            least = renew_planes(shapes, rules.tested, unproven, before, poses, block)
-            unproven = unproven & ~is_apart(least)
-        if any_lane(unproven):
-            still = lane_bits(unproven)
+        asked = row, before, poses, chain, shapes, rules, episodes
+        doubtful = doubtful_steps(fresh, changed, *asked, block, alone)
+        if looks:
+            # What follows from a step while its command is held has to be free, too.
+            onward = lane_bits(fresh & ~(block.holds[0] > 0.0)) & ~doubtful
+            more = poses, chain, shapes, rules, episodes, block, session.ahead, alone
+            doubtful |= unsafe_stops(onward, row, *more)
+        if doubtful != 0:
             for lane in range(row.shape[0]):
-                if still >> lane & 1 == 0:
+                if doubtful >> lane & 1 == 0:
                     continue
-                if episodes.scenes.shape[0] > 0:
-                    place_bodies(episodes.scenes[row[lane]], alone.before)
-                doubt = prove_alone(lane, chain, shapes, rules.tested, before, poses, block, alone)
-                if doubt != 0:
-                    # The episode leaves the block, at its end or to wait for Coal.
-                    e, row[lane] = row[lane], -1
-                    store_episode(lane, e, episodes, block)
-                    for pair in range(n_pairs):
-                        # It has not moved yet.
-                        episodes.planes[e, pair, GAP] = as_numbers(block.height)[pair, lane]
-                    n_alive -= 1
-                    episodes.doubt[e] = doubt
-                    pair = first_contact(lane, doubt, chain, shapes, rules.tested, block, alone)
-                    episodes.touched[e] = pair if rules.tested > 0 else 0
-                    stuck = episodes.attempt[e] > 0 and episodes.tried[e] == math.inf
-                    if shielded and not stuck and (pair > 0 or episodes.attempt[e] > 0):
-                        fails_again(e, pair, episodes)
-                        again[lane] = e
-                    elif pair > 0:
-                        refuse_step(e, rules, episodes)
-                    else:
-                        episodes.status[e] = PAUSED
-                        n_paused += 1
+                # The episode leaves the block, at its end or to wait for Coal.
+                e, row[lane] = row[lane], -1
+                store_episode(lane, e, episodes, block)
+                for pair in range(n_pairs):
+                    # It has not moved yet.
+                    episodes.planes[e, pair, GAP] = as_numbers(block.height)[pair, lane]
+                n_alive -= 1
+                pair = episodes.touched[e]
+                if rules.tested == 0:
+                    episodes.touched[e] = 0
+                sure = looks or pair > 0 or episodes.attempt[e] > 0
+                if shielded and sure and not is_stuck(e, episodes):
+                    fails_again(e, pair, episodes)
+                    if looks:
+                        take_rows(block.former_drive, lane, episodes.drive[e])
+                    again[lane] = e
+                elif pair > 0:
+                    refuse_step(e, rules, episodes)
+                else:
+                    episodes.status[e] = PAUSED
+                    n_paused += 1
             if n_alive == 0:
                 continue
         # Move the others, observe, and reward.
@@ -304,7 +301,7 @@ def refuse(rows: NDArray[np.int64], session: Session) -> None:
     """End episodes whose step Coal found to touch, or let a shield replace it."""
     rules, episodes = session.rules, session.episodes
     for index in range(rows.shape[0]):
-        if rules.shield.shape[0] > 0:
+        if rules.shield.shape[0] > 0 and not is_stuck(rows[index], episodes):
             fails_again(rows[index], 0, episodes)
         else:
             refuse_step(rows[index], rules, episodes)

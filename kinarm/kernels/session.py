@@ -45,6 +45,7 @@ def layouts(
     plant: int = 0,
     drive: int = 0,
     goal_width: int = 0,
+    looks: int = 0,
 ) -> tuple[Layout, Layout]:
     """Layouts of a block and of a single episode's space.
 
@@ -63,6 +64,8 @@ def layouts(
         Numbers of an episode's plant, and rows of its state; 0 if it is ideal.
     goal_width : int
         Length of goals; 0 for standing points that are reached at once.
+    looks : int
+        1 for a shield that looks at what follows from a step, else 0.
     """
     has_plant, beyond = Fixed(plant > 0), Fixed(goal_width > 0)
     block = {
@@ -80,6 +83,9 @@ def layouts(
         # Numbers and state of a plant; joint positions and goal as seen, and poses there.
         "plant": (has_plant, plant),
         "drive": (drive, n_actuated),
+        # For a shield: its state before the step, and 1 where a command is held.
+        "former_drive": (drive * looks, n_actuated),
+        "holds": (Fixed(looks),),
         "sensed": (has_plant, n_joints),
         # Joint positions as seen before the step.
         "former": (ONE, n_joints),
@@ -186,6 +192,8 @@ def load_episode(
     as_numbers(block.cleared)[0, lane] = 1.0 if episodes.cleared[e] else 0.0
     as_numbers(block.attempt)[0, lane] = episodes.attempt[e]
     as_numbers(block.alive)[0, lane] = 1.0
+    if block.holds.shape[0] > 0:
+        as_numbers(block.holds)[0, lane] = 0.0
 
 
 @inlined
@@ -226,6 +234,7 @@ class SessionFields(NamedTuple):
     episodes: Episodes
     block: Block
     alone: Alone
+    ahead: Block
 
 
 class Session(Record):
@@ -243,22 +252,26 @@ class Session(Record):
         self.control: Control = control.values
         self.episodes: Episodes = episodes.values
         weights, n_observations = self.control.weights, self.episodes.observation.shape[1]
-        space = work_space(
-            n_joints=self.episodes.q.shape[1],
-            n_actuated=rules.values.step_limit.shape[0],
-            n_observations=n_observations,
-            n_pairs=self.episodes.planes.shape[1],
-            n_terms=rules.values.reward.shape[0],
-            n_placed=shapes.values.placed.shape[0],
-            widest=max(self.control.layers.tolist()[1:], default=1),
-            own=weights.shape[1] if weights.shape[0] > 1 else 0,
-            summed=n_observations if len(self.episodes.moments) > 0 else 0,
-            plant=self.episodes.plant.shape[1],
-            drive=self.episodes.drive.shape[1],
-            goal_width=self.episodes.pursuit.reached.shape[1],
-        )
+        lags = self.episodes.plant.shape[1] > 0 or len(shapes.values.moving) > 0
+        sizes = {
+            "n_joints": self.episodes.q.shape[1],
+            "n_actuated": rules.values.step_limit.shape[0],
+            "n_observations": n_observations,
+            "n_pairs": self.episodes.planes.shape[1],
+            "n_terms": rules.values.reward.shape[0],
+            "n_placed": shapes.values.placed.shape[0],
+            "widest": max(self.control.layers.tolist()[1:], default=1),
+            "own": weights.shape[1] if weights.shape[0] > 1 else 0,
+            "summed": n_observations if len(self.episodes.moments) > 0 else 0,
+            "plant": self.episodes.plant.shape[1],
+            "drive": self.episodes.drive.shape[1],
+            "goal_width": self.episodes.pursuit.reached.shape[1],
+            "looks": int(lags and len(rules.values.shield) > 0),
+        }
+        space = work_space(**sizes)
         furnish(shapes.values.placed, *space)
-        parts = SessionFields(chain, shapes, rules, control, episodes, *space)
+        ahead = layouts(**sizes)[0].record() if sizes["looks"] else space[0]
+        parts = SessionFields(chain, shapes, rules, control, episodes, *space, ahead)
         super().__init__(*table(parts), parts)
         self._others: list[Session] = []
 

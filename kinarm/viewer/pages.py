@@ -38,7 +38,7 @@ from kinarm.viewer.drawing import (
     draw_trace,
     put,
 )
-from kinarm.viewer.parts import OUTCOME_COLOURS, TRACE_SIDES, goal_pose
+from kinarm.viewer.parts import PAGE_COLOURS, TRACE_SIDES, goal_pose
 from kinarm.viewer.visual_shapes import arm_parts, collision_parts, link_joints
 from kinarm.world import World
 
@@ -53,6 +53,9 @@ NOTEBOOK_FRAME = Markup(
 
 NEARER = 0.8
 """Camera's distance from an arm alone, as a share of that in replays."""
+
+RUN_FIELDS = ("policy", "outcome", "contact", "replaced")
+"""What scripts know of a recording as it is."""
 
 BARE_GROUND = Scene(obstacles=(), goal_regions=())
 
@@ -194,7 +197,7 @@ def replay_page(
     data = {
         **arm_data(arm, scene),
         "traceIndices": 6 * TRACE_SIDES,
-        "colours": {name: f"#{colour:06x}" for name, colour in OUTCOME_COLOURS.items()},
+        "colours": {name: f"#{colour:06x}" for name, colour in PAGE_COLOURS.items()},
         "trials": shown,
         "groups": list(groups),
         "heading": heading,
@@ -269,7 +272,7 @@ def _trial_data(runs: Sequence[Recording], moving: Mapping[str, BodyMotion]) -> 
         "moving": {path: motion.offsets(times).tolist() for path, motion in moving.items()},
         "runs": [
             {
-                **{name: getattr(run, name) for name in ("policy", "outcome", "contact")},
+                **{name: getattr(run, name) for name in RUN_FIELDS},
                 "contactPoint": None if run.contact_point is None else run.contact_point.tolist(),
                 "refused": None if run.refused is None else run.refused.tolist(),
                 "states": run.states.tolist(),

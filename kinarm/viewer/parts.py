@@ -67,6 +67,9 @@ PLAIN = FINISHES["graphite"], FINISHES["paint"]
 OUTCOME_COLOURS = {"success": 0x0072B2, "collision": 0xD55E00, "truncated": 0xE69F00}
 """Distinguishable with any colour vision (Okabe and Ito)."""
 
+PAGE_COLOURS = {**OUTCOME_COLOURS, "replaced": 0xCC79A7}
+"""Those of outcomes, and of steps that a shield replaced."""
+
 TRACES: dict[str | None, Finish] = {
     None: Finish(0x4D5A68, roughness=0.5),
     **{outcome: Finish(colour, roughness=0.5) for outcome, colour in OUTCOME_COLOURS.items()},

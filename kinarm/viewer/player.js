@@ -25,6 +25,15 @@ function verdict(run, trial) {
   return `${count(steps, "step")}${trial.floor ? ratio : ""}`;
 }
 
+/** What a shield did in a step, or in all of them. */
+function replacement(run, step) {
+  const now = run.replaced.find(([at]) => at === step);
+  if (now) {
+    return now[1] ? now[1].join(" would touch ") : "not proven free";
+  }
+  return count(run.replaced.length, "step");
+}
+
 function fillCard(trial, swatch) {
   element("eyebrow").textContent = `Problem ${trial.problem} · trial ${trial.trial}`;
   element("runs").replaceChildren(...trial.runs.map((run, k) => {
@@ -37,6 +46,7 @@ function fillCard(trial, swatch) {
     row.append(name, badge(run.outcome, ...BADGES[run.outcome]), make("span", { class: "note" }, verdict(run, trial)));
     return row;
   }));
+  element("replaced-row").hidden = !trial.runs[0].replaced.length;
   element("floor-row").hidden = trial.floor === null;
   if (trial.floor !== null) {
     element("floor").textContent = trial.floor > trial.horizon ? "out of reach" : count(trial.floor, "step");
@@ -63,6 +73,9 @@ function drawPlot(trial, frames, colours) {
     }
     plot.append(make("path", { class: k ? "curve ghost" : "curve", d: `M${points.join("L")}`, style: `stroke: ${colour}` }));
   });
+  for (const [step] of trial.runs[0].replaced) {
+    plot.append(make("line", { class: "replaced", x1: across(step), x2: across(step + 1), y1: 100, y2: 100, style: `stroke: ${colours.replaced}` }));
+  }
   plot.append(make("line", { class: "head", y1: -4, y2: 104 }));
 }
 
@@ -123,6 +136,7 @@ class Player {
     element("frame").setAttribute("aria-valuetext", `step ${step} of ${this.frames}`);
     element("step").replaceChildren(String(Math.min(step, last)), make("small", {}, ` / ${last}`));
     element("distance").textContent = metres(run.distances[Math.min(step, last)]);
+    element("replaced").textContent = replacement(run, step);
     const head = element("plot").querySelector(".head");
     const x = (1000 * this.time) / Math.max(this.frames, 1);
     head.setAttribute("x1", x);

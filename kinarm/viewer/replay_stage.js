@@ -69,6 +69,10 @@ class ReplayStage extends Stage {
     const ended = time >= main.states.length - 1;
     this.start.root.visible = time > 0.5;
     this.over(main, ended);
+    const bodies = ended ? null : main.replaced.find(([step]) => step === Math.floor(time))?.[1];
+    if (bodies) {
+      this.glow(bodies.map((body) => this.data.links[body]), this.data.colours.replaced);
+    }
     this.viewer.set_dirty();
   }
 

@@ -124,11 +124,11 @@ class Stage {
       frame.children.filter((child) => child.name.startsWith("part_")).map((part) => part.children[0].material));
   }
 
-  /** Light up what some joints carry, of which something touches. */
-  glow(joints) {
+  /** Light up what some joints carry, of which something touches, or would have. */
+  glow(joints, colour = TOUCHED) {
     this.tint.forEach((materials, joint) => {
       for (const material of materials) {
-        material.emissive.set(joints.includes(joint) ? TOUCHED : 0x000000);
+        material.emissive.set(joints.includes(joint) ? colour : 0x000000);
       }
     });
   }
