@@ -3,7 +3,7 @@
 import numpy as np
 
 from kinarm.kernels.compiling import Array
-from kinarm.kernels.plant import GOAL_NOISE, HIGH_BITS, MOST_CHANGE, OFFSETS, SERVO, SUBSTEPS
+from kinarm.kernels.plant import GOAL_NOISE, HIGH_BITS, MOST_CHANGE, OFFSETS, RATE, SERVO, SUBSTEPS
 from kinarm.world import World
 
 WORD = 2**64
@@ -52,7 +52,7 @@ class ReferencePlant:
 
     def _moved_joint(self, axis: int, start: float, told: float) -> float:
         servo = self._numbers[SERVO : SERVO + 4].reshape(2, 2)
-        most_change, trapeze, brake, jerk, ease = self._numbers[MOST_CHANGE:OFFSETS]
+        most_change, trapeze, brake, jerk, ease = self._numbers[MOST_CHANGE:RATE]
         q, part, limit = start, self._part, self._limit[axis]
         lower, upper = self._arm.lower[axis], self._arm.upper[axis]
         for _ in range(SUBSTEPS):

@@ -1,20 +1,27 @@
 """Plants beside MuJoCo: the same arm on position servos, step by step.
 
-``python -m docs.measurements.plants data/results/plants`` writes ``mujoco.json``, from which
-``docs/tables.py`` makes the tables of *Lag, delay and noise*.
+``python -m docs.measurements.plants data/results/plants`` writes ``mujoco.json``, and with
+``--transfer`` what policies reach there in several `MANNERS`, a file each. From these
+``docs/tables.py`` makes the tables of *Lag, delay and noise* and *Transfer to MuJoCo*. A call with
+``--transfer`` goes on where another one ended.
 """
 
 import argparse
 import json
+import time
 from collections.abc import Mapping
+from dataclasses import replace
+from itertools import product
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal, NamedTuple
 
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
 from kinarm import Plant, Simulator
+from kinarm.evaluation.contestants import NEVER
+from kinarm.kernels.plant import COMMAND
 from kinarm.mjcf import mjcf
 from kinarm.policies import Policy, load_policy
 
@@ -39,6 +46,50 @@ SETTINGS: Mapping[str, Mapping[str, Any]] = {
     "20 Hz, two steps, commanded": {"bandwidth": 20.0, "delay": 2, "feedback": "commanded"},
 }
 """Plants by what a table calls them."""
+
+LAGS: Mapping[str, Mapping[str, Any]] = {
+    **{f"servo of {rate} Hz": {"bandwidth": float(rate)} for rate in (50, 20, 10, 5, 3)},
+    "20 Hz, a step of delay": {"bandwidth": 20.0, "delay": 1},
+    "20 Hz, two steps of delay": {"bandwidth": 20.0, "delay": 2},
+    "50 Hz, noise of .03 rad": {"bandwidth": 50.0, "noise": 0.03},
+    **{
+        f"20 Hz, at most {most} rad/s^2": {"bandwidth": 20.0, "acceleration": float(most)}
+        for most in (400, 200, 100, 50)
+    },
+}
+"""Plants of the table of transfer."""
+
+
+class Manner(NamedTuple):
+    """How a policy drives an arm.
+
+    Attributes
+    ----------
+    feedback : str
+        Which joint positions it sees; see `kinarm.Plant`.
+    shield : str
+        Of what a shield lets nothing touch: the motion of ``"commands"``, as if
+        joints obeyed at once, or that of ``"joints"``, whose plant it knows.
+    speed : float
+        Share of its actions that is commanded, for as many times as long.
+    """
+
+    feedback: str = "measured"
+    shield: Literal["", "commands", "joints"] = ""
+    speed: float = 1.0
+
+
+MANNERS = {
+    "bare": Manner(),
+    "commanded": Manner("commanded"),
+    "shield": Manner(shield="commands"),
+    "both": Manner("commanded", "commands"),
+    "both, lag known": Manner("commanded", "joints"),
+    "quarter of the speed": Manner(speed=0.25),
+}
+
+FEWER = 0.15
+"""Share of the trials in cells but those of networks that see their commands."""
 
 SUBSTEP = 0.0005
 """Time step of MuJoCo [s]."""
@@ -108,16 +159,27 @@ class ServoArm:
         return ways
 
 
-def run(arm: ServoArm, policy: Policy | Array, starts: Array, goals: Array) -> dict[str, Array]:
+def run(
+    arm: ServoArm,
+    policy: Policy | Array,
+    starts: Array,
+    goals: Array,
+    manner: Manner | None = None,
+) -> dict[str, Array]:
     """Drive arms by a policy, or by actions, shape (n, horizon, n_actions).
 
     Returns which succeeded and touched, shape (n,), and the paths of actuated joints, shape (n,
     horizon + 1, n_actions).
     """
     simulator, plant = arm.simulator, arm.simulator.problem.plant
-    n, n_actions, horizon = len(starts), simulator.n_actions, simulator.task.horizon
+    manner = manner or Manner(plant.feedback)
+    n, n_actions = len(starts), simulator.n_actions
+    horizon = round(simulator.task.horizon / manner.speed)
     world, rng = simulator.world, np.random.default_rng(0)
     lower, upper = (each[:n_actions] for each in (simulator.arm.lower, simulator.arm.upper))
+    known = replace(plant, noise=0.0) if manner.shield == "joints" else Plant()
+    shield = simulator.with_plant(known).with_tolerance(NEVER).shielded()
+    told = shield.reset(starts, goals)
     arm.begin(starts)
     commands = [starts[:, :n_actions]]
     paths = np.empty((n, horizon + 1, n_actions))
@@ -125,29 +187,34 @@ def run(arm: ServoArm, policy: Policy | Array, starts: Array, goals: Array) -> d
     success, contact = np.zeros(n, dtype=bool), np.zeros(n, dtype=bool)
     for step in range(horizon):
         seen = starts.copy()
-        seen[:, :n_actions] = commands[-1] if plant.feedback == "commanded" else paths[:, step]
-        if plant.feedback == "measured":
+        seen[:, :n_actions] = commands[-1] if manner.feedback == "commanded" else paths[:, step]
+        if manner.feedback == "measured":
             seen[:, :n_actions] += float(plant.range_of("noise")[0]) * rng.normal(
                 size=(n, n_actions)
             )
         actions = (
             policy(world.observe(seen, goals)) if isinstance(policy, Policy) else policy[:, step]
         )
-        told = commands[-1] + np.clip(actions, -1, 1) * simulator.step_limit
-        commands.append(np.clip(told, lower, upper))
+        actions = manner.speed * np.clip(actions, -1, 1)
+        if manner.shield:
+            shield.step(told, actions)
+            moved = told.q[:, :n_actions] if known.ideal else told.drive[:, COMMAND]
+            commands.append(moved.copy())
+        else:
+            moved = commands[-1] + actions * simulator.step_limit
+            commands.append(np.clip(moved, lower, upper))
         late = commands[max(0, len(commands) - 1 - int(plant.range_of("delay")[1]))]
         running = ~(success | contact)
         ways = arm.move(late, running | isinstance(policy, np.ndarray))
         paths[:, step + 1] = ways[:, -1]
-        visited = np.repeat(starts[:, None], ways.shape[1], axis=1)
-        visited[:, :, :n_actions] = ways
-        touched = world.in_contact(visited.reshape(-1, starts.shape[1])).reshape(n, -1).any(axis=1)
-        contact |= running & touched
-        success |= (
-            running
-            & ~touched
-            & (world.distances(visited[:, -1], goals) <= simulator.task.tolerance)
-        )
+        visited = np.repeat(starts[running, None], ways.shape[1], axis=1)
+        visited[:, :, :n_actions] = ways[running]
+        touched = world.in_contact(visited.reshape(-1, starts.shape[1]))
+        touched = touched.reshape(len(visited), ways.shape[1]).any(axis=1)
+        near = world.distances(visited[:, -1], goals[running]) <= simulator.task.tolerance
+        contact[running], success[running] = touched, ~touched & near
+        if isinstance(policy, Policy) and (success | contact).all():
+            break
     return {"success": success, "contact": contact, "paths": paths}
 
 
@@ -189,11 +256,39 @@ def measure(trials: int) -> dict[str, Any]:
     return {"trials": trials, "rows": rows}
 
 
+def measure_transfer(trials: int, name: str, path: Path) -> None:
+    """Fill in the cells of a policy that its file lacks."""
+    record = {"policy": name, "trials": trials, "cells": []}
+    if path.exists():
+        record = json.loads(path.read_text())
+    known = {(cell["plant"], cell["manner"]) for cell in record["cells"]}
+    cells = [each for each in product(LAGS, MANNERS) if each not in known]
+    ideal = Simulator("both")
+    starts, goals = ideal.sample(np.random.default_rng(2), record["trials"])
+    for number, (plant, manner) in enumerate(cells):
+        begun, how = time.process_time(), MANNERS[manner]
+        decides = how.feedback == "commanded" and name.startswith("ppo")
+        count = record["trials"] if decides else round(FEWER * record["trials"])
+        arm = ServoArm(ideal.with_plant(Plant(**LAGS[plant])), count)
+        ended = run(arm, load_policy(name), starts[:count], goals[:count], how)
+        shares = {key: float(ended[key].mean()) for key in ("success", "contact")}
+        seconds = round(time.process_time() - begun, 1)
+        cell = {"plant": plant, "manner": manner, "trials": count, **shares, "seconds": seconds}
+        record["cells"].append(cell)
+        path.write_text(json.dumps(record, indent=1) + "\n")
+        print(f"{name}, {number + 1} of {len(cells)}: {cell}", flush=True)
+
+
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("out", type=Path)
     parser.add_argument("--trials", type=int, default=1000)
+    parser.add_argument("--transfer", nargs="*", metavar="POLICY", help="by default, four")
     given = parser.parse_args()
     given.out.mkdir(parents=True, exist_ok=True)
-    record = measure(given.trials)
-    (given.out / "mujoco.json").write_text(json.dumps(record, indent=1) + "\n")
+    if given.transfer is not None:
+        for policy in given.transfer or POLICIES:
+            measure_transfer(given.trials, policy, given.out / f"transfer-{policy}.json")
+    else:
+        record = measure(given.trials)
+        (given.out / "mujoco.json").write_text(json.dumps(record, indent=1) + "\n")

@@ -252,3 +252,20 @@ def test_text_can_be_read(watched, size):
     show(watched, 0, 0)
     contrast, where = watched.tell(CONTRAST.read_text())
     assert contrast >= 4.5, where
+
+
+def test_steps_that_a_shield_replaced_are_marked_with_the_reason(visit, recorded, tmp_path):
+    reasons = ((2, ("hand", "left bench")), (4, None))
+    page, path = replace(recorded[0], replaced=reasons), tmp_path / "shielded.html"
+    replay_page([page, recorded[1]], path)
+    with visit(path, (600, 400)) as watched:
+        show(watched, 0, 0)
+        assert watched.page.locator("#plot .replaced").count() == 2
+        said = []
+        for frame in (0, 2, 4):
+            show(watched, 0, frame)
+            said.append(text(watched, "#replaced"))
+        assert said == ["2 steps", "hand would touch left bench", "not proven free"]
+        show(watched, 1, 0)
+        assert watched.page.locator("#replaced-row").is_hidden()
+        assert watched.complaints == []

@@ -1,0 +1,84 @@
+"""Policies behind a shield: their names, figures, recordings and files."""
+
+import json
+
+import numpy as np
+import pytest
+
+from kinarm import Simulator
+from kinarm._files import write_text
+from kinarm.evaluation import EvaluationRequest, ReplayRequest, evaluate
+from kinarm.evaluation.finding import find_contestants
+from kinarm.evaluation.replay.request import described
+from kinarm.evaluation.selection import group_names
+from kinarm.policies import Policy, load_policy
+from kinarm.recording import load_recordings, record_rollouts, save_recordings
+
+NAME = "ars-linear-both-seed0"
+
+
+@pytest.fixture(scope="module")
+def policy():
+    return load_policy(NAME)
+
+
+def test_a_shielded_policy_acts_behind_a_shield_wherever_it_is_rolled_out(policy, tmp_path):
+    simulator, safe = Simulator("both"), policy.shielded()
+    safe.save(tmp_path / "safe.npz")
+    scenarios = simulator.sample(np.random.default_rng(0), 400)
+    expected = simulator.shielded().rollout(policy, *scenarios)
+    assert expected.interventions.sum() > 0
+    for each in (safe, Policy.load(tmp_path / "safe.npz")):
+        found = simulator.rollout(each, *scenarios)
+        for column in ("configurations", "steps", "interventions"):
+            np.testing.assert_array_equal(getattr(found, column), getattr(expected, column))
+    assert simulator.rollout(policy, *scenarios).interventions.shape == (0,)
+
+
+def test_it_has_a_name_and_a_group_of_its_own(policy):
+    assert evaluate(policy.shielded(), trials=1).name == "ars-linear-both+shield"
+    shielded = find_contestants("ars-linear-both+shield")
+    assert shielded[0].name == "ars-linear-both+shield-seed0"
+    names = group_names((*shielded, *find_contestants("ars-linear-both")))
+    assert set(names.values()) == {"ars-linear-both", "ars-linear-both+shield"}
+    assert shielded[0].shielded() is shielded[0]
+
+
+def test_replaced_steps_stand_in_tables_where_there_is_a_shield():
+    request = EvaluationRequest(policies=(NAME,), shield=True, trials=300, oracle=False)
+    evaluations = {each.name: each for each in request.evaluate()}
+    safe, bare = evaluations["ars-linear-both+shield-seed0"], evaluations[NAME]
+    share = safe.rollouts.interventions.sum() / safe.rollouts.steps.sum()
+    assert safe.metrics["replaced"].value == share > 0
+    assert bare.metrics["replaced"].value is None
+
+
+def test_recordings_say_which_steps_were_replaced_and_why(tmp_path):
+    simulator = Simulator("both").with_plant("hard")
+    scenarios = simulator.sample(np.random.default_rng(0), 100)
+    rollouts = simulator.rollout(load_policy(NAME).shielded(), *scenarios, record=True)
+    recordings = record_rollouts(simulator, rollouts, "some")
+    for recording, count in zip(recordings, rollouts.interventions, strict=True):
+        assert len(recording.replaced) == count
+    pairs = {pair for each in recordings for _, pair in each.replaced}
+    assert ("hand", "left bench") in pairs
+    assert pairs <= {None, *simulator.world.contact_model.pair_names}
+    save_recordings(tmp_path / "some.npz", recordings)
+    read = load_recordings(tmp_path / "some.npz")
+    assert [each.replaced for each in read] == [each.replaced for each in recordings]
+    some = max(recordings, key=lambda each: len(each.replaced))
+    assert f", {len(some.replaced)} replaced by the shield, " in described(some)
+
+
+def test_replays_take_a_shield_or_a_shielded_name(tmp_path):
+    given = {"trials": 250, "oracle": False}
+    (by_option,) = ReplayRequest(policy=NAME, shield=True, **given).recordings()
+    assert {each.policy for each in by_option} == {"ars-linear-both+shield-seed0"}
+    assert not by_option[0].problem.stepping.shield
+    assert any(each.replaced for each in by_option)
+    request = EvaluationRequest(policies=(NAME,), shield=True, seed=0, **given)
+    write_text(tmp_path / "evaluation.json", json.dumps(request.run().to_json()))
+    source, name = tmp_path / "evaluation.json", "ars-linear-both+shield-seed0"
+    chosen = {"trial": tuple(range(250)), "oracle": False}
+    (again,) = ReplayRequest(source=source, policy=name, **chosen).recordings()
+    assert [each.replaced for each in again] == [each.replaced for each in by_option]
