@@ -88,8 +88,11 @@ MANNERS = {
     "quarter of the speed": Manner(speed=0.25),
 }
 
-FEWER = 0.15
-"""Share of the trials in cells but those of networks that see their commands."""
+DECISIVE = (*list(LAGS)[1:4], *list(LAGS)[5:7])
+"""Plants in which networks with commanded state and shield face all trials."""
+
+FEWER = 0.1
+"""Share of the trials in other cells."""
 
 SUBSTEP = 0.0005
 """Time step of MuJoCo [s]."""
@@ -267,7 +270,7 @@ def measure_transfer(trials: int, name: str, path: Path) -> None:
     starts, goals = ideal.sample(np.random.default_rng(2), record["trials"])
     for number, (plant, manner) in enumerate(cells):
         begun, how = time.process_time(), MANNERS[manner]
-        decides = how.feedback == "commanded" and name.startswith("ppo")
+        decides = name.startswith("ppo") and manner.startswith("both") and plant in DECISIVE
         count = record["trials"] if decides else round(FEWER * record["trials"])
         arm = ServoArm(ideal.with_plant(Plant(**LAGS[plant])), count)
         ended = run(arm, load_policy(name), starts[:count], goals[:count], how)

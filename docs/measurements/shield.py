@@ -1,0 +1,116 @@
+"""What a shield keeps: random steps that touch nothing, and bodies that move.
+
+``python -m docs.measurements.shield data/results/plants`` writes ``shield.json``, from which
+``docs/tables.py`` makes the tables of *Contact*. Ten million steps take ten minutes.
+"""
+
+import argparse
+import json
+import time
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from kinarm import BodyMotion, RandomBodies, ReachProblem, Simulator
+from kinarm.episodes import Rollouts
+from kinarm.policies import load_policy
+
+CLUTTER = RandomBodies(
+    name="box",
+    shape="box",
+    count=(2, 5),
+    smallest=(0.05, 0.05, 0.1),
+    largest=(0.2, 0.2, 0.4),
+    near="path",
+    lower=(-0.1, -0.1, -0.1),
+    upper=(0.1, 0.1, 0.1),
+    turned="any",
+)
+HELD, EPISODES, TRIALS = 8, 1000, 400
+"""Steps for which a random action is held, episodes at a time, and trials among balls."""
+
+
+def with_bodies(bodies: RandomBodies) -> ReachProblem:
+    """The paper's third problem with random bodies."""
+    problem = ReachProblem.load("both")
+    return problem.replace(scene=replace(problem.scene, random_bodies=(bodies,)))
+
+
+def swinging(speed: float) -> RandomBodies:
+    """Two balls that swing through the arm's space at a speed along x and y [m/s]."""
+    ways = ((0.5, 0.35, 0.35, 0.0), (1.5, -0.35, -0.35, 0.0), (2.0, 0.0, 0.0, 0.0))
+    waypoints = tuple((0.7 * time / speed, *offset) for time, *offset in ways)
+    return RandomBodies(
+        name="ball",
+        shape="sphere",
+        count=(2, 2),
+        smallest=(0.08,),
+        largest=(0.15,),
+        near="path",
+        lower=(-0.3, -0.3, -0.3),
+        upper=(0.3, 0.3, 0.3),
+        motion=BodyMotion(waypoints=waypoints, periodic=True),
+    )
+
+
+def random_rollouts(simulator: Simulator) -> Iterator[Rollouts]:
+    """Episodes of random actions, without end."""
+    rng = np.random.default_rng(0)
+    shape = EPISODES, simulator.task.horizon // HELD, simulator.n_actions
+    while True:
+        starts, goals = simulator.sample(rng, EPISODES)
+        actions = np.repeat(rng.uniform(-1.5, 1.5, shape), HELD, axis=1)
+        yield simulator.rollout_actions(actions, starts, goals)
+
+
+def random_steps(name: str, simulator: Simulator, least: int) -> dict[str, Any]:
+    """At least so many random steps behind a shield: replaced ones, contacts, and speed."""
+    counts, begun = np.zeros(3, dtype=int), time.process_time()
+    for rollouts in random_rollouts(simulator):
+        ends = rollouts.steps, rollouts.interventions, rollouts.collision
+        counts += [int(column.sum()) for column in ends]
+        if counts[0] >= least:
+            break
+    steps, replaced, contacts = counts.tolist()
+    speed = steps / (time.process_time() - begun)
+    row = {"what": name, "steps": steps, "replaced": replaced, "contacts": contacts}
+    return {**row, "steps_per_second_and_core": round(speed)}
+
+
+def beside_balls(speed: float) -> dict[str, Any]:
+    """Success and contact of a policy, and contact of a resting arm, without and with a shield."""
+    simulator = Simulator(with_bodies(swinging(speed)))
+    scenarios = simulator.sample(np.random.default_rng(0), TRIALS)
+    shape = TRIALS, simulator.task.horizon, simulator.n_actions
+    row: dict[str, Any] = {"speed": speed}
+    for name, each in (("bare", simulator), ("shield", simulator.shielded())):
+        driven = each.rollout(load_policy("ppo-best-both-seed0"), *scenarios)
+        resting = each.rollout_actions(np.zeros(shape), *scenarios)
+        row[name] = [driven.success.mean(), driven.collision.mean(), resting.collision.mean()]
+    return row
+
+
+def measure(least: int) -> dict[str, Any]:
+    """Everything for the tables."""
+    worlds = {
+        "random scenes, `ideal`": Simulator(with_bodies(CLUTTER)).shielded(),
+        "`both`, `hard`": Simulator("both").with_plant("hard").shielded(),
+    }
+    return {
+        "trials": TRIALS,
+        "balls": [beside_balls(speed) for speed in (0.2, 0.5, 1.0, 2.0)],
+        "random": [random_steps(name, each, least) for name, each in worlds.items()],
+    }
+
+
+if __name__ == "__main__":
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("out", type=Path)
+    parser.add_argument("--steps", type=int, default=10_000_000)
+    given = parser.parse_args()
+    given.out.mkdir(parents=True, exist_ok=True)
+    record = measure(given.steps)
+    (given.out / "shield.json").write_text(json.dumps(record, indent=1) + "\n")
