@@ -9,9 +9,11 @@ import os
 import re
 import shlex
 import textwrap
+from collections import Counter
 from collections.abc import Mapping
 from dataclasses import fields
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -33,6 +35,9 @@ from kinarm.policies import find_learner
 
 DOCS = Path(__file__).parent
 RESULTS = DOCS.parent / "data" / "results"
+
+MANNERS = ("bare", "commanded", "shield", "both", "both, lag known", "quarter of the speed")
+"""Columns of the table of transfer to MuJoCo."""
 
 SYMBOLS = {
     "n": "number of trials; of several training seeds, all their trials together",
@@ -272,6 +277,65 @@ def servos_table() -> str:
     return markdown_table(["plant", "apart %", *heads], rows)
 
 
+def transfer_records() -> list[dict[str, Any]]:
+    """What was recorded of policies in MuJoCo, in the order of the pages."""
+    paths = sorted(
+        (RESULTS / "plants").glob("transfer-*.json"), key=lambda path: "-ars" in str(path)
+    )
+    return [json.loads(path.read_text(encoding="utf-8")) for path in paths]
+
+
+def transfer_table() -> str:
+    """Success and contact of policies in MuJoCo by plant and manner, in percent."""
+    rows: list[list[str]] = []
+    for record in transfer_records():
+        name = f"`{record['policy'].removesuffix('-both-seed0')}`"
+        figures: dict[str, dict[str, str]] = {}
+        for cell in record["cells"]:
+            said = f"{100 * cell['success']:.1f} / {100 * cell['contact']:.1f}"
+            figures.setdefault(cell["plant"], {})[cell["manner"]] = said
+        rows += [
+            [name, plant, *(row.get(each, "") for each in MANNERS)]
+            for plant, row in figures.items()
+        ]
+    return markdown_table(["policy", "plant", *MANNERS], rows)
+
+
+def transfer_trials() -> str:
+    """How many trials the cells of that table have."""
+    counts = Counter(cell["trials"] for each in transfer_records() for cell in each["cells"])
+    said = (f"{cells} cells have {trials} trials" for trials, cells in sorted(counts.items()))
+    return f"{', '.join(said)}.\n"
+
+
+def shield_table() -> str:
+    """Random steps behind a shield."""
+    record = json.loads((RESULTS / "plants" / "shield.json").read_text(encoding="utf-8"))
+    rows = [
+        [
+            row["what"],
+            f"{row['steps']:,}",
+            f"{100 * row['replaced'] / row['steps']:.1f}",
+            f"{row['contacts']}",
+            f"{row['steps_per_second_and_core']:,}",
+        ]
+        for row in record["random"]
+    ]
+    return markdown_table(["in", "steps", "replaced %", "contacts", "steps/s on a busy core"], rows)
+
+
+def balls_table() -> str:
+    """Success and contact beside bodies that move, in percent."""
+    record = json.loads((RESULTS / "plants" / "shield.json").read_text(encoding="utf-8"))
+    rows = []
+    for row in record["balls"]:
+        shares = [[f"{100 * each:.1f}" for each in row[name]] for name in ("bare", "shield")]
+        driven = [f"{success} / {contact}" for success, contact, _ in shares]
+        rows.append([f"{row['speed']:g} m/s", *driven, *(each[2] for each in shares)])
+    head = ["speed of the balls", "`ppo-best`", "behind a shield", "resting", "behind a shield"]
+    return markdown_table(head, rows)
+
+
 def injections_table() -> str:
     """Errors of arms that the check of a contract was given, and how many it missed, by kind."""
     record = json.loads((RESULTS / "contract" / "injections.json").read_text(encoding="utf-8"))
@@ -294,6 +358,10 @@ TABLES = {
     "injections": injections_table,
     "plants": plants_table,
     "servos": servos_table,
+    "transfer-mujoco": transfer_table,
+    "transfer-trials": transfer_trials,
+    "shield": shield_table,
+    "balls": balls_table,
     "arm": lambda: arm_table("paper"),
     "capsules": lambda: capsule_table("paper"),
     "arms": arms_table,

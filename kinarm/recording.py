@@ -28,6 +28,9 @@ OUTCOMES = get_args(Outcome)
 ARRAYS = ("states", "distances", "goal", "refused", "contact_point", "goals")
 """Array fields of a `Recording`."""
 
+Replaced = tuple[tuple[int, tuple[str, str] | None], ...]
+"""Steps that a shield replaced, and what would have touched, if that is known."""
+
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Recording:
@@ -80,7 +83,7 @@ class Recording:
     contact_point: NDArray[np.float64] | None = None
     refused: NDArray[np.float64] | None = None
     goals: NDArray[np.float64] | None = None
-    replaced: tuple[tuple[int, tuple[str, str] | None], ...] = ()
+    replaced: Replaced = ()
     steps_lower_bound: int | None = None
     provenance: Mapping[str, Any] = field(default_factory=dict)
 
@@ -242,7 +245,7 @@ def record_rollouts(
                 contact=touch.pair if touch else None,
                 contact_point=touch.point if touch else None,
                 refused=touch.configuration if touch else None,
-                replaced=_replaced_steps(world, rollouts, number),
+                replaced=replaced_steps(world, rollouts.replaced, number),
                 steps_lower_bound=steps_lower_bound(number) if steps_lower_bound else None,
                 provenance=dict(provenance or {}),
             )
@@ -250,16 +253,11 @@ def record_rollouts(
     return recordings
 
 
-def _replaced_steps(
-    world: World, rollouts: Rollouts, number: int
-) -> tuple[tuple[int, tuple[str, str] | None], ...]:
-    """Steps of a rollout that a shield replaced, and what would have touched."""
-    if not len(rollouts.replaced):
-        return ()
-    pairs, names = rollouts.replaced[number].tolist(), world.contact_model.pair_names
-    return tuple(
-        (step, names[pair - 1] if pair > 0 else None) for step, pair in enumerate(pairs) if pair
-    )
+def replaced_steps(world: World, replaced: NDArray[np.int64], number: int = 0) -> Replaced:
+    """Which steps of an episode were replaced; see `kinarm.episodes.Episodes.replaced`."""
+    numbers = replaced[number].tolist() if len(replaced) else []
+    pairs = {0: None, -1: None, **dict(enumerate(world.contact_model.pair_names, start=1))}
+    return tuple((step, pairs[pair]) for step, pair in enumerate(numbers) if pair)
 
 
 def record_path(

@@ -20,7 +20,16 @@ from kinarm.kernels.kinematics import forward_kinematics, place_bodies, rotated
 from kinarm.kernels.lane_copies import move_bodies, moving_frame, place_between, take
 from kinarm.kernels.lanes import LANES, as_numbers, lane_bits, select
 from kinarm.kernels.planes import FINE, GAP, height_above, separate
-from kinarm.kernels.plant import COMMAND, DELAY, OFFSETS, RATE, STEADY, VELOCITY, move_joints
+from kinarm.kernels.plant import (
+    CHANGE,
+    COMMAND,
+    DELAY,
+    OFFSETS,
+    RATE,
+    STEADY,
+    VELOCITY,
+    move_joints,
+)
 from kinarm.kernels.proof import is_apart
 from kinarm.kernels.session import Alone, Block
 
@@ -299,7 +308,9 @@ def comes_to_rest(
             swing = math.sqrt(velocity * velocity + rate * rate * error * error)
             fastest = rules.step_limit[axis] / rules.time_step
             calm = calm & (swing <= min(plant[0, STEADY], fastest))
+            calm = calm & (abs(ahead.drive[CHANGE, axis]) <= plant[0, STEADY])
             calm = calm & (plant[0, DELAY] <= passed + 1.0)
+            # How far it may still go.
             ahead.action[0, axis] = abs(error) + swing / rate
     for pair in range(shapes.planes.shape[0]):
         left = ahead.planes[pair, GAP]

@@ -14,7 +14,7 @@ from kinarm.policies.export import WITH_MEMORY
 from kinarm.policies.policy import Policy
 from kinarm.policies.running.backend import WiredArm
 from kinarm.policies.running.watchdog import SafeLimits, Watchdog
-from kinarm.recording import Recording
+from kinarm.recording import Recording, replaced_steps
 from kinarm.simulator import Simulator
 
 REST, SETTLED, LONGEST_REST = 1e-3, 0.1, 2.0
@@ -146,7 +146,7 @@ class Run:
             )
 
     def _episode(self, goal: Array) -> Episodes:
-        return self.simulator.reset(self._told[None], goal[None])
+        return self.simulator.reset(self._told[None], goal[None], record=True)
 
     def _step(self, episodes: Episodes, reading: Array) -> Array:
         """Let the policy act; where the step leads, shape (n_joints,) [rad or m]."""
@@ -238,9 +238,10 @@ class Run:
             contact=contact.pair if contact else None,
             contact_point=contact.point if contact else None,
             refused=contact.configuration if contact else None,
+            replaced=replaced_steps(world, episodes.replaced),
             provenance={
                 "ended": ended,
-                "interventions": int(episodes.interventions[0]),
+                "interventions": int(episodes.interventions.sum()),
                 "speed": self.speed,
                 "rate": self.rate,
             },
