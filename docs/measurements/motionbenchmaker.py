@@ -9,6 +9,10 @@ import sys
 import tarfile
 import tempfile
 from collections import Counter
+from collections.abc import Iterator
+from dataclasses import replace
+from itertools import groupby
+from operator import itemgetter
 from pathlib import Path
 from typing import NamedTuple
 
@@ -17,7 +21,7 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from docs.measurements.self_contact import pieces_of
-from kinarm import Arm, ArmSpecification, Mount, Scene
+from kinarm import Arm, ArmSpecification, Mount, ReachProblem, Scene
 from kinarm.collision import ContactModel
 from kinarm.contact_pairs import make_verdicts_reliable
 from kinarm.evaluation.report.templating import markdown_table
@@ -74,37 +78,51 @@ class Robot(NamedTuple):
         return found
 
 
-def main(folder: Path) -> None:
-    """Print the table, and pairs of bodies by which a verdict differs from Coal's with meshes."""
-    arm = ArmSpecification(
+def robot_arm(folder: Path) -> ArmSpecification:
+    """The UR5 of a folder, with its hollow links cut into pieces."""
+    return ArmSpecification(
         source=str(folder / "ur5.urdf"),
         tool_frame="tool0",
         home=(0.0, -np.pi / 2, np.pi / 2, -np.pi / 2, -np.pi / 2, 0.0),
+        pieces=pieces_of("ur5"),
     )
-    arms = [Arm.load(arm), Arm.load(arm, pieces=pieces_of("ur5"))]
-    robots = [*map(Robot.of_kinarm, arms), Robot.of_urdf(folder)]
-    rows, differing, free = [], Counter(), np.zeros((3, 3), dtype=int)
+
+
+def problems_of(
+    folder: Path, arm: ArmSpecification
+) -> Iterator[tuple[str, ReachProblem, NDArray[np.float64]]]:
+    """Name of the set, problem, and its start and goal, of each problem of a folder."""
     with tempfile.TemporaryDirectory() as place:
         with tarfile.open(folder / "problems.tar.bz2") as archive:
             archive.extractall(place, filter="data")
-        for scenes in sorted(Path(place, "problems").iterdir()):
-            counts = np.zeros_like(free)
-            for scene in sorted(scenes.glob("scene*.yaml")):
-                request = scene.with_name(scene.name.replace("scene", "request"))
-                problem, q = import_problem(scene, request, arm, Mount())
-                *ours, meshes = (robot.contact_pairs(problem.scene, q) for robot in robots)
-                for row, pairs in enumerate((*ours, meshes)):
-                    start, goal = (pair is None for pair in pairs)
-                    counts[row] += (start, goal, start and goal)
-                for name, pairs in zip(HEADER[1:], ours, strict=False):
-                    differing.update(
-                        f"{name}: {' and '.join(pair or other)} {'touch' if pair else 'do not'}"
-                        for pair, other in zip(pairs, meshes, strict=True)
-                        if (pair is None) != (other is None)
-                    )
-            rows.append([f"`{scenes.name}`", *map(_cell, counts)])
-            free += counts
-            sys.stderr.write(f"{' | '.join(rows[-1])}\n")
+        for scene in sorted(Path(place, "problems").glob("*/scene*.yaml")):
+            request = scene.with_name(scene.name.replace("scene", "request"))
+            yield scene.parent.name, *import_problem(scene, request, arm, Mount())
+
+
+def main(folder: Path) -> None:
+    """Print the table, and pairs of bodies by which a verdict differs from Coal's with meshes."""
+    specification = robot_arm(folder)
+    hulls, pieces = replace(specification, pieces=None), specification
+    arms = [Arm.load(hulls), Arm.load(pieces)]
+    robots = [*map(Robot.of_kinarm, arms), Robot.of_urdf(folder)]
+    rows, differing, free = [], Counter(), np.zeros((3, 3), dtype=int)
+    for scenes, members in groupby(problems_of(folder, hulls), key=itemgetter(0)):
+        counts = np.zeros_like(free)
+        for _, problem, q in members:
+            *ours, meshes = (robot.contact_pairs(problem.scene, q) for robot in robots)
+            for row, pairs in enumerate((*ours, meshes)):
+                start, goal = (pair is None for pair in pairs)
+                counts[row] += (start, goal, start and goal)
+            for name, pairs in zip(HEADER[1:], ours, strict=False):
+                differing.update(
+                    f"{name}: {' and '.join(pair or other)} {'touch' if pair else 'do not'}"
+                    for pair, other in zip(pairs, meshes, strict=True)
+                    if (pair is None) != (other is None)
+                )
+        rows.append([f"`{scenes}`", *map(_cell, counts)])
+        free += counts
+        sys.stderr.write(f"{' | '.join(rows[-1])}\n")
     print(markdown_table(HEADER, [*rows, ["all", *map(_cell, free)]]))
     for told, count in sorted(differing.items()):
         print(f"{count:4}  {told}")

@@ -14,12 +14,6 @@ from kinarm.kernels.planes import axis_in_world, is_placed, surface
 
 
 @inlined
-def is_exact(shapes: ContactShapes, pair: int) -> bool:
-    """Whether the shapes of a pair are known exactly."""
-    return shapes.exact[shapes.pairs[pair, 1]] and shapes.exact[shapes.pairs[pair, 2]]
-
-
-@inlined
 def radius_of(shapes: ContactShapes, body: int, poses: Array) -> float:
     """Radius of a body's capsule [m]; minus infinity if nothing in the body is known."""
     frame = shapes.bodies[body, 2]

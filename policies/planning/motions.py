@@ -12,7 +12,7 @@ from kinarm.motion_contact import first_share
 from kinarm.policies.planning.kernels.sweeping import sweep
 from kinarm.world import World
 
-BEND = 0.01
+BEND = 0.1
 """Bend of a part of a motion at most, from which parts have their length [m]."""
 
 MOST_ASKED = 64

@@ -9,7 +9,7 @@ from kinarm.kernels.compiling import Array
 from kinarm.policies.planning.kernels.sweeping import nearest
 from kinarm.policies.planning.motions import Motions
 
-EXTENSIONS, LONGEST_EXTENSION = 1500, 0.25
+EXTENSIONS, LONGEST_EXTENSION = 1500, 0.5
 """Samples at most, and how far a tree grows towards one, as a share of the joints' longest way."""
 
 SHORTCUTS = 120

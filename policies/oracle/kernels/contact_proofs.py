@@ -1,8 +1,8 @@
 """Proofs for a box of configurations: contact throughout it.
 
 Two points, of the axes of bodies or of a box or half-space, prove contact
-throughout a box if they stay closer than the radii. Bodies that are only
-enclosed by such shapes prove nothing.
+throughout a box if they stay closer than the radii. Bodies of the arm count as
+the capsules that lie in them.
 
 No branch depends on values, so that lanes may hold a box each.
 """
@@ -17,7 +17,7 @@ from kinarm.kernels.compiling import Array, Vector, helper, inlined
 from kinarm.kernels.distance import between_segments, closest_to_box
 from kinarm.kernels.kinematics import point_jacobian, rotated_back, to_frame
 from kinarm.kernels.lanes import any_lane, select
-from kinarm.kernels.overlap import is_exact, radius_of
+from kinarm.kernels.overlap import radius_of
 from kinarm.kernels.planes import DEPTH, axis_in_world, surface
 
 TRIED = 5
@@ -94,7 +94,7 @@ def overlaps(
     proven: bool = wanted & (half[0] < 0.0)
     for pair in range(pairs.shape[0]):
         kind, i, j = pairs[pair, 0], pairs[pair, 1], pairs[pair, 2]
-        if not is_exact(shapes, pair):
+        if kind != BETWEEN_CAPSULES and not shapes.exact[j]:
             continue
         a, b, reach = axis_of(shapes, i, poses)
         middle = along(a, b, 0.5)
