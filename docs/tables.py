@@ -354,8 +354,23 @@ def injections_table() -> str:
     return markdown_table(["error, in", "arms", "missed"], rows)
 
 
+def plans_table() -> str:
+    """Plans for MotionBenchMaker's problems by kinarm and by OMPL, and with hulls."""
+    record = json.loads((RESULTS / "plans" / "motionbenchmaker.json").read_text(encoding="utf-8"))
+    rows = []
+    for name, of in record["pieces"].items():
+        row = [f"`{name}`"]
+        for told, part in ((of, ""), (of, "ompl "), (record["hulls"][name], "")):
+            times = " / ".join(f"{1000 * value:.0f}" for value in told[f"{part}seconds"])
+            row += [f"{told[f'{part}solved']} of {told[f'{part}solved of']}", times]
+        rows.append([*row, " / ".join(f"{value:.2f}" for value in of["ratio"])])
+    heads = ["problems", "kinarm", "ms", "OMPL", "ms", "hulls", "ms", "duration"]
+    return markdown_table(heads, rows)
+
+
 TABLES = {
     "injections": injections_table,
+    "plans": plans_table,
     "plants": plants_table,
     "servos": servos_table,
     "transfer-mujoco": transfer_table,

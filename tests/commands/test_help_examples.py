@@ -108,6 +108,10 @@ def test_examples_of_running(run, place):
     check(run, examples_of(run, "kinarm-run"), least=2)
 
 
+def test_examples_of_planning(run, place):
+    check(run, examples_of(run, "kinarm-plan"), least=3)
+
+
 def test_examples_of_problems(run, place):
     check(run, examples_of(run, "kinarm-problem"), least=1)
 

@@ -14,8 +14,9 @@ from dataclasses import replace
 import numpy as np
 from kinarm import Simulator
 from kinarm.goals import GoalSpecification
-from kinarm.policies import Oracle, load_policy, train_policy
+from kinarm.policies import Oracle, load_policy, plan, train_policy
 from kinarm.policies.recipes import recipe
+from kinarm.scene import Obstacle, Scene
 
 def show(*arrays):
     print(hashlib.sha256(b"".join(np.asarray(array).tobytes() for array in arrays)).hexdigest())
@@ -37,6 +38,10 @@ posed = simulator.problem.replace(goal=GoalSpecification(kind="pose", rotation_t
 oracle = Oracle(posed)
 solutions = oracle.solve_batch(*oracle.simulator.sample(np.random.default_rng(0), 8))
 show(solutions.steps_lower_bound, solutions.actions, solutions.final_distance)
+wall = Obstacle(name="wall", lower=(0.35, -0.06, 0.0), upper=(0.8, 0.06, 0.9))
+walled = simulator.problem.replace(scene=Scene(obstacles=(wall,)))
+planned = plan(walled, [-0.9, 0.3, 0, 0, 0.2, 0.7], [0.5, 0.5, 0.4], goal_kind="position")
+show(planned.waypoints, planned.trajectory.at(planned.times()))
 for name, problem in (("paper", "right"), ("tuned", "both")):
     state = train_policy(recipe("ars", name, problem=problem, iterations=10)).state
     curve = np.array([point[:4] for point in state.curve])
@@ -69,5 +74,5 @@ def usual_bits() -> list[str]:
 def hashes(said: str) -> list[str]:
     """What was printed."""
     found = said.split()
-    assert len(set(found)) == 9
+    assert len(set(found)) == 10
     return found
