@@ -7,12 +7,15 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from kinarm.arm import Arm
-from kinarm.errors import InvalidInputError, ProblemError
+from kinarm.errors import InvalidInputError, ProblemError, finite_array
 from kinarm.goals import REST_PARTS
 from kinarm.kernels.compiling import Array
 from kinarm.observation import OBSERVATION, VERSION
 from kinarm.observation_part import ACTUATED, JOINTS, ONCE, SLOTS, Part, Ranges
 from kinarm.problem import ReachProblem
+
+GOAL_KEYS = ("observation", "achieved_goal", "desired_goal")
+"""Entries of a dictionary observation; the achieved goal is what the tool has reached."""
 
 
 class ObservationLayout(NamedTuple):
@@ -98,6 +101,29 @@ class ObservationLayout(NamedTuple):
             ) from error
         goal, offset = (np.r_[tuple(part)] for part in slices)
         return goal, offset
+
+    def flat(self, given: Mapping[str, ArrayLike]) -> Array:
+        """Make a flat observation of a dictionary observation, shape (..., n_observations).
+
+        It holds just ``observation``, shape (..., n_own), ``achieved_goal`` and ``desired_goal``,
+        shape (..., goal_width) [m].
+        """
+        if set(given) != set(GOAL_KEYS):
+            wanted, found = (", ".join(map(str, keys)) for keys in (GOAL_KEYS, given))
+            raise InvalidInputError(f"a dictionary observation has the keys {wanted}, got {found}")
+        if self.history > 1:
+            raise InvalidInputError("a policy with a history needs a flat observation")
+        (goals, offsets), entries = self.goal_entries, self.entries(of_goal=False)
+        batch = np.shape(given["desired_goal"])[:-1]
+        rows = (None,) * len(batch)
+        goal, tool = (
+            finite_array(name, given[name], (*rows, len(goals)))
+            for name in ("desired_goal", "achieved_goal")
+        )
+        rest = finite_array("observation", given["observation"], (*rows, len(entries)))
+        flat = np.empty((*batch, self.size))
+        flat[..., goals], flat[..., offsets], flat[..., entries] = goal, goal - tool, rest
+        return flat
 
     @property
     def sees_bodies(self) -> bool:

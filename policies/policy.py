@@ -156,7 +156,7 @@ class Policy:
             Of no effect; the state is returned as it is.
         """
         if isinstance(observation, Mapping):
-            observation = flat_observation(observation, self.layout)
+            observation = self.layout.flat(observation)
         return self(observation), state
 
     def networks(self) -> Networks:
@@ -332,33 +332,3 @@ def policy_of_content(content: Archive, where: str) -> Policy:
         return policy
     observations, actions = (arrays[name] for name in signs)
     return replace(policy, mirror=Mirror(observations, actions, policy.layout.side or 0))
-
-
-GOAL_KEYS = ("observation", "achieved_goal", "desired_goal")
-"""Entries of a dictionary observation; the achieved goal is what the tool has reached."""
-
-
-def flat_observation(
-    given: Mapping[str, ArrayLike], layout: ObservationLayout
-) -> NDArray[np.float64]:
-    """Make a flat observation of a dictionary observation.
-
-    It holds just ``observation``, shape (..., n_own), ``achieved_goal`` and ``desired_goal``, shape
-    (..., goal_width) [m]. The flat one has the shape (..., n_observations), of the layout.
-    """
-    if set(given) != set(GOAL_KEYS):
-        wanted, found = (", ".join(map(str, keys)) for keys in (GOAL_KEYS, given))
-        raise InvalidInputError(f"a dictionary observation has the keys {wanted}, got {found}")
-    if layout.history > 1:
-        raise InvalidInputError("a policy with a history needs a flat observation")
-    (goals, offsets), entries = layout.goal_entries, layout.entries(of_goal=False)
-    batch = np.shape(given["desired_goal"])[:-1]
-    rows = (None,) * len(batch)
-    goal, tool = (
-        finite_array(name, given[name], (*rows, len(goals)))
-        for name in ("desired_goal", "achieved_goal")
-    )
-    rest = finite_array("observation", given["observation"], (*rows, len(entries)))
-    flat = np.empty((*batch, layout.size))
-    flat[..., goals], flat[..., offsets], flat[..., entries] = goal, goal - tool, rest
-    return flat

@@ -22,8 +22,8 @@ from numpy.typing import NDArray
 from kinarm import Plant, Simulator
 from kinarm.evaluation.contestants import NEVER
 from kinarm.kernels.plant import COMMAND
-from kinarm.mjcf import mjcf
 from kinarm.policies import Policy, load_policy
+from kinarm.policies.running.mujoco_arm import SUBSTEP, servo_model
 
 Array = NDArray[np.float64]
 
@@ -94,12 +94,6 @@ DECISIVE = (*list(LAGS)[1:4], *list(LAGS)[5:7])
 FEWER = 0.1
 """Share of the trials in other cells."""
 
-SUBSTEP = 0.0005
-"""Time step of MuJoCo [s]."""
-
-ARMATURE = 100.0
-"""Inertia of the geared motors [kg m2]: links of 1 kg hardly move each other."""
-
 
 class ServoArm:
     """Arms in MuJoCo on critically damped position servos, without gravity.
@@ -114,19 +108,12 @@ class ServoArm:
 
     def __init__(self, simulator: Simulator, count: int) -> None:
         self.simulator, plant = simulator, simulator.problem.plant
-        model = self.model = mujoco.MjModel.from_xml_string(mjcf(simulator.world, SUBSTEP))
+        model = servo_model(mujoco, simulator.world, plant.range_of("bandwidth")[0])
+        self.model, self.states = model, [mujoco.MjData(model) for _ in range(count)]
         model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONSTRAINT
-        model.dof_armature[:] = ARMATURE
-        self.states = [mujoco.MjData(model) for _ in range(count)]
-        # Gains for what each joint moves at home.
-        mujoco.mj_forward(model, self.states[0])
-        inertia = np.zeros((model.nv, model.nv))
-        mujoco.mj_fullM(model, self.states[0], inertia)
-        moved, rate = np.diag(inertia), 2 * np.pi * plant.range_of("bandwidth")[0]
-        model.actuator_gainprm[:, 0] = moved * rate**2
-        model.actuator_biasprm[:, 1] = -moved * rate**2
-        model.actuator_biasprm[:, 2] = -2 * moved * rate
         if plant.acceleration:
+            rate = 2 * np.pi * plant.range_of("bandwidth")[0]
+            moved = model.actuator_gainprm[:, 0] / rate**2
             most = moved * plant.range_of("acceleration")[0]
             model.actuator_forcelimited[:] = 1
             model.actuator_forcerange[:] = np.stack([-most, most], axis=1)

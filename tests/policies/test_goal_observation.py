@@ -5,7 +5,6 @@ import pytest
 
 from kinarm.envs.goal import GoalInterface
 from kinarm.errors import InvalidInputError
-from kinarm.policies.policy import flat_observation
 
 
 @pytest.fixture
@@ -17,16 +16,16 @@ def shown(simulator):
 
 def test_is_what_the_environment_split(shown):
     flat, parts, layout = shown
-    np.testing.assert_allclose(flat_observation(parts, layout), flat, rtol=0, atol=1e-15)
+    np.testing.assert_allclose(layout.flat(parts), flat, rtol=0, atol=1e-15)
     one = {name: part[3] for name, part in parts.items()}
-    np.testing.assert_allclose(flat_observation(one, layout), flat[3], rtol=0, atol=1e-15)
+    np.testing.assert_allclose(layout.flat(one), flat[3], rtol=0, atol=1e-15)
 
 
 def test_arms_of_other_joints(any_simulator):
     flat = any_simulator.world.observe(*any_simulator.sample(np.random.default_rng(0), 5))
     parts = GoalInterface(any_simulator).observe(flat)
     layout = any_simulator.world.layout
-    np.testing.assert_allclose(flat_observation(parts, layout), flat, rtol=0, atol=1e-15)
+    np.testing.assert_allclose(layout.flat(parts), flat, rtol=0, atol=1e-15)
 
 
 @pytest.mark.parametrize(
@@ -40,4 +39,4 @@ def test_arms_of_other_joints(any_simulator):
 def test_others_are_refused(shown, change, message):
     one = {name: part[0] for name, part in shown[1].items()}
     with pytest.raises(InvalidInputError, match=message):
-        flat_observation({**one, **change}, shown[2])
+        shown[2].flat({**one, **change})
