@@ -29,7 +29,7 @@ def test_libraries_with_the_longest_vectors_give_the_same_bits():
     assert computed_bits({"OPENBLAS_CORETYPE": "SkylakeX"}) == usual_bits()
 
 
-@pytest.mark.slow
+@pytest.mark.rare
 def test_kernels_for_a_plain_processor_give_the_same_bits():
     """All kernels are compiled anew; for AVX2, where their instructions are counted."""
     variables = {"NUMBA_CPU_NAME": "x86-64", "NUMBA_CPU_FEATURES": "+sse2"}

@@ -43,7 +43,7 @@ def success(model):
     return reached.mean()
 
 
-@pytest.mark.slow
+@pytest.mark.rare
 @one_torch_thread()
 def test_sac_learns_to_reach_poses():
     model = SAC(
