@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from kinarm._files import Archive, load_archive, reading, save_archive
+from kinarm._files import Archive, load_archive, reading, save_archive, write_atomically
 from kinarm.arm import Arm
 from kinarm.errors import InvalidInputError, PolicyFileError, finite_array
 from kinarm.networks import ACTIVATIONS, Activation, Mirror, Networks, checked_activations
@@ -244,6 +244,16 @@ class Policy:
         from kinarm.policies.conversion.to_torch import network_module
 
         return network_module(policy_content(self).arrays, self.activations, self.mirror)
+
+    def to_onnx(self, path: str | Path) -> None:
+        """Write the network in ONNX, from ``observation`` to ``action`` (extra ``export``).
+
+        `kinarm.policies.export_policy` also writes a model from joint positions to commands.
+        """
+        from kinarm.policies.conversion.to_torch import onnx_model
+
+        model = onnx_model(self.to_torch(), {"observation": self.n_observations}, "action")
+        write_atomically(path, lambda file: file.write(model))
 
     def shielded(self) -> "Policy":
         """The same policy behind a shield: what would touch is replaced wherever it is rolled out.

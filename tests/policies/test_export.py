@@ -363,6 +363,8 @@ class TestONNX:
         answer = run_onnx(folder / "policy.onnx", joint_positions=q, goal=goals, commanded=q)
         np.testing.assert_allclose(answer, command, rtol=0, atol=1e-5)
         seen = simulator.world.observe(q, goals)
+        policy.to_onnx(folder / "own.onnx")
+        assert (folder / "own.onnx").read_bytes() == (folder / "network.onnx").read_bytes()
         action = run_onnx(folder / "network.onnx", observation=seen)
         np.testing.assert_allclose(action, policy(seen), rtol=0, atol=1e-5)
 
