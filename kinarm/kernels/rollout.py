@@ -20,7 +20,14 @@ from kinarm.kernels.plant import COMMAND, move_joints, rest, sense
 from kinarm.kernels.proof import prove_configurations
 from kinarm.kernels.reward import ROTATION, add_reward, observe, remember
 from kinarm.kernels.session import Session, load_episode, store_episode, take_number
-from kinarm.kernels.shield import fails_again, is_stuck, replace_step, take_down, unsafe_stops
+from kinarm.kernels.shield import (
+    fails_again,
+    held_at_rest,
+    is_stuck,
+    replace_step,
+    take_down,
+    unsafe_stops,
+)
 
 
 @lean_kernel
@@ -174,6 +181,9 @@ def advance(counters: NDArray[np.int64], session: Session) -> int:
             onward = lane_bits(fresh & ~(block.holds[0] > 0.0)) & ~doubtful
             more = poses, chain, shapes, rules, episodes, block, session.ahead, alone
             doubtful |= unsafe_stops(onward, row, *more)
+            if shapes.moving.shape[0] == 0:
+                # Where the arm rests, it is known to be free.
+                doubtful &= ~held_at_rest(block)
         if doubtful != 0:
             for lane in range(row.shape[0]):
                 if doubtful >> lane & 1 == 0:

@@ -45,6 +45,9 @@ KEPT = 1e-3
 DIFFERENCE = 1e-6
 """Move of a joint for the slope of a height [rad or m]."""
 
+ROUNDING = 1e-12
+"""Move of a joint that counts as none [rad or m]."""
+
 WARNING = 0.2
 """Time in which moving bodies go on, and the arm, where it is then, stays free of them [s]."""
 
@@ -221,6 +224,15 @@ def take_down(lane: int, e: int, episodes: Episodes, block: Block) -> None:
     as_numbers(block.attempt)[0, lane] = 0.0
     if block.holds.shape[0] > 0:
         as_numbers(block.holds)[0, lane] = 0.0
+
+
+@inlined
+def held_at_rest(block: Block) -> int:
+    """Bits of lanes whose arm holds its command and does not move."""
+    still = block.holds[0] > 0.0
+    for joint in range(block.q.shape[1]):
+        still = still & (abs(block.target[0, joint] - block.q[0, joint]) <= ROUNDING)
+    return lane_bits(still)
 
 
 @helper

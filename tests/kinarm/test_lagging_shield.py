@@ -48,6 +48,15 @@ def test_no_motion_touches(simulator):
             assert simulator.world.contact(here, there) is None
 
 
+def test_an_arm_may_stay_within_a_micrometre_of_contact(simulator):
+    """There, a step counts as contact even if it leads nowhere."""
+    start = np.array([[-2.646941661551418, 2.1704060311243802, 3.143250312650669]])
+    start = np.append(start, [[-0.5147626012274045, -1.3051352492950334, 0.0]], axis=1)
+    given = np.zeros((1, 64, 5)), start, np.array([[0.1, -0.66, 0.325]])
+    assert simulator.rollout_actions(*given).collision
+    assert not simulator.shielded().rollout_actions(*given).collision
+
+
 def test_a_command_may_be_held_at_any_time(simulator):
     actions, starts, goals = drawn(simulator, 100, seed=1)
     shielded, still = simulator.shielded(), np.zeros((100, simulator.n_actions))
