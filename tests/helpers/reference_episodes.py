@@ -1,9 +1,9 @@
 """Episodes held against the slow reference, one at a time."""
 
 import numpy as np
-from simulators import changed
 
 from kinarm.reference import ReferenceSimulator
+from tests.helpers.simulators import changed
 
 
 def scripted(table):
