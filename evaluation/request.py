@@ -2,14 +2,13 @@
 
 from collections.abc import Callable
 from contextlib import ExitStack
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, ClassVar
 
 from kinarm._files import absolute, check_output, only_writer, write_text
 from kinarm._tables import TableOptions
 from kinarm.errors import FROM_ZERO, TRIALS, InvalidInputError
-from kinarm.problem import ProblemLike, ReachProblem
 from kinarm.problem_files import problem_names
 from kinarm.problem_options import ProblemOptions, say_choices
 
@@ -144,10 +143,7 @@ class EvaluationRequest(ProblemOptions, TableOptions):
         "against": "the first named policy",
         "columns": "all that fit",
     }
-
-    def resolve(self, default: ProblemLike = "right") -> ReachProblem:
-        """The problem that the options make of a default; a shield is the contestants' own."""
-        return super(EvaluationRequest, replace(self, shield=False)).resolve(default)
+    SHIELDS_POLICIES: ClassVar = True
 
     def __post_init__(self) -> None:
         super().__post_init__()

@@ -80,6 +80,9 @@ class ProblemOptions(Checked):
     }
     """Values without an option, in words."""
 
+    SHIELDS_POLICIES: ClassVar = False
+    """Whether a shield is that of policies, and the problem stays as it is."""
+
     def resolve(self, default: ProblemLike = "right") -> ReachProblem:
         """The problem that the options make of a default."""
         changed = {name: getattr(self, name) for name in init_fields(ProblemOptions)}
@@ -89,7 +92,7 @@ class ProblemOptions(Checked):
         problem = ReachProblem.load(named or default)
         for name in ("arm", "tool_frame", "package_dirs"):
             del changed[name]
-        changed["shield"] = self.shield or None
+        changed["shield"] = (self.shield and not self.SHIELDS_POLICIES) or None
         return problem.replace(arm=self._arm(problem), **changed)
 
     def _arm(self, problem: ReachProblem) -> "Arm | None":

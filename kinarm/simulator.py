@@ -207,8 +207,9 @@ class Simulator(EpisodeRunner):
             Collect moments of the observations about it.
         """
         if getattr(policies, "shield", False) and not self.problem.stepping.shield:
-            given = policies, starts, goals
-            return self.shielded().rollout(*given, record=record, shift=shift)
+            return self.shielded().rollout(
+                policies, starts, goals, policy_index=policy_index, record=record, shift=shift
+            )
         q, goal = self.world.check_scenarios(starts, goals)
         if shift is not None:
             shift = finite_array("shift", shift, (self.n_observations,))

@@ -188,8 +188,8 @@ def _self_test(
     command[:, :n] = np.clip(moved, arm.lower[:n], arm.upper[:n])
     if resolution:
         command[:, :n] = np.round(command[:, :n] / resolution) * resolution
-    sign, offset = (np.array([each[name] for each in contract["joints"]]) for name in WIRING)
-    readings, told = (sign * joints + offset for joints in (q, command))
+    wiring = {name: np.array([each[name] for each in contract["joints"]]) for name in WIRING}
+    readings, told = (arm_policy.to_readings(wiring, joints) for joints in (q, command))
     columns = {"joint_positions": readings, "goal": goals, "command": told}
     return [{name: rows[k].tolist() for name, rows in columns.items()} for k in range(VECTORS)]
 

@@ -8,61 +8,27 @@ import argparse
 import json
 import time
 from collections.abc import Iterator
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from kinarm import BodyMotion, RandomBodies, ReachProblem, Simulator
+from kinarm import Simulator
 from kinarm.episodes import Rollouts
 from kinarm.policies import load_policy
+from tests.helpers.random_scenes import CLUTTER, among, swinging
+from tests.helpers.reference_episodes import held_actions
 
-CLUTTER = RandomBodies(
-    name="box",
-    shape="box",
-    count=(2, 5),
-    smallest=(0.05, 0.05, 0.1),
-    largest=(0.2, 0.2, 0.4),
-    near="path",
-    lower=(-0.1, -0.1, -0.1),
-    upper=(0.1, 0.1, 0.1),
-    turned="any",
-)
 HELD, EPISODES, TRIALS = 8, 1000, 400
 """Steps for which a random action is held, episodes at a time, and trials among balls."""
-
-
-def with_bodies(bodies: RandomBodies) -> ReachProblem:
-    """The paper's third problem with random bodies."""
-    problem = ReachProblem.load("both")
-    return problem.replace(scene=replace(problem.scene, random_bodies=(bodies,)))
-
-
-def swinging(speed: float) -> RandomBodies:
-    """Two balls that swing through the arm's space at a speed along x and y [m/s]."""
-    ways = ((0.5, 0.35, 0.35, 0.0), (1.5, -0.35, -0.35, 0.0), (2.0, 0.0, 0.0, 0.0))
-    waypoints = tuple((0.7 * time / speed, *offset) for time, *offset in ways)
-    return RandomBodies(
-        name="ball",
-        shape="sphere",
-        count=(2, 2),
-        smallest=(0.08,),
-        largest=(0.15,),
-        near="path",
-        lower=(-0.3, -0.3, -0.3),
-        upper=(0.3, 0.3, 0.3),
-        motion=BodyMotion(waypoints=waypoints, periodic=True),
-    )
 
 
 def random_rollouts(simulator: Simulator) -> Iterator[Rollouts]:
     """Episodes of random actions, without end."""
     rng = np.random.default_rng(0)
-    shape = EPISODES, simulator.task.horizon // HELD, simulator.n_actions
     while True:
         starts, goals = simulator.sample(rng, EPISODES)
-        actions = np.repeat(rng.uniform(-1.5, 1.5, shape), HELD, axis=1)
+        actions = held_actions(simulator, rng, EPISODES, HELD)
         yield simulator.rollout_actions(actions, starts, goals)
 
 
@@ -82,7 +48,7 @@ def random_steps(name: str, simulator: Simulator, least: int) -> dict[str, Any]:
 
 def beside_balls(speed: float) -> dict[str, Any]:
     """Success and contact of a policy, and contact of a resting arm, without and with a shield."""
-    simulator = Simulator(with_bodies(swinging(speed)))
+    simulator = Simulator(among("both", swinging(speed)))
     scenarios = simulator.sample(np.random.default_rng(0), TRIALS)
     shape = TRIALS, simulator.task.horizon, simulator.n_actions
     row: dict[str, Any] = {"speed": speed}
@@ -96,7 +62,7 @@ def beside_balls(speed: float) -> dict[str, Any]:
 def measure(least: int) -> dict[str, Any]:
     """Everything for the tables."""
     worlds = {
-        "random scenes, `ideal`": Simulator(with_bodies(CLUTTER)).shielded(),
+        "random scenes, `ideal`": Simulator(among("both", CLUTTER)).shielded(),
         "`both`, `hard`": Simulator("both").with_plant("hard").shielded(),
     }
     return {

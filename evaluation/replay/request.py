@@ -4,7 +4,7 @@ import webbrowser
 from collections import Counter
 from collections.abc import Callable
 from contextlib import suppress
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, field, fields
 from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING, ClassVar
@@ -16,7 +16,6 @@ from kinarm._console import working
 from kinarm._files import check_output
 from kinarm.errors import FROM_ZERO, InvalidInputError
 from kinarm.evaluation.request import policy_choices
-from kinarm.problem import ProblemLike, ReachProblem
 from kinarm.problem_options import ProblemOptions, say_choices
 
 if TYPE_CHECKING:
@@ -118,6 +117,8 @@ class ReplayRequest(ProblemOptions):
     port: int | None = field(default=None, metadata={"at_most": 65535})
     browser: bool = True
 
+    SHIELDS_POLICIES: ClassVar = True
+
     GROUPS: ClassVar = {
         "what is replayed": "source policy vec_normalize wrapper compare allow_other_arm",
         "which trials": "trials seed trial worst collisions failures oracle",
@@ -151,10 +152,6 @@ class ReplayRequest(ProblemOptions):
             self._refuse("trials of an evaluation", "arm")
         elif self.source is not None:
             self._refuse("a file of recordings", "vec_normalize wrapper")
-
-    def resolve(self, default: ProblemLike = "right") -> ReachProblem:
-        """The problem that the options make of a default; a shield is the policies' own."""
-        return super(ReplayRequest, replace(self, shield=False)).resolve(default)
 
     def _refuse(self, mode: str, names: str) -> None:
         for option in self._given(names):

@@ -141,13 +141,11 @@ def plan(problem: ProblemLike, start: ArrayLike | None, goal: ArrayLike, **setti
     world = world.in_scene(first, place)
     ends = _reaching(world, wanted.goal_kind, aim, "goal", first, joints)
     motions, rng = Motions(world, wanted.margin), np.random.default_rng(wanted.seed)
-    for name, chosen in (("start", first[None]), ("goal", ends)):
-        far = [motions.free_share(q, q) == 1.0 for q in chosen]
-        if not any(far):
-            raise InvalidInputError(f"{name} is closer to contact than {wanted.margin:g} m")
+    _far_enough(motions, "start", first[None])
+    ends = _far_enough(motions, "goal", ends)
     found = []
     for _ in range(PATHS):
-        path = find_path(motions, first, ends[far], rng, wanted.samples)
+        path = find_path(motions, first, ends, rng, wanted.samples)
         if path is None:
             raise NoPathError(wanted.samples)
         found.append((path, trajectory_of(path, limits, motions)))
@@ -165,6 +163,14 @@ def plan(problem: ProblemLike, start: ArrayLike | None, goal: ArrayLike, **setti
         limits=limits,
         proven=f"{proven} at any time of the motion",
     )
+
+
+def _far_enough(motions: Motions, what: str, configurations: Array) -> Array:
+    """Configurations that keep the margin; InvalidInputError if none does."""
+    kept = [motions.free_share(q, q) == 1.0 for q in configurations]
+    if not any(kept):
+        raise InvalidInputError(f"{what} is closer to contact than {motions.margin:g} m")
+    return configurations[kept]
 
 
 def _world_of_all_joints(problem: ReachProblem) -> tuple[World, int]:

@@ -1,12 +1,49 @@
-"""Scenes of bodies of every shape."""
+"""Scenes of bodies of every shape, and random bodies."""
 
 from dataclasses import replace
 
 import numpy as np
 
-from kinarm.bodies import SHAPES, Body
+from kinarm.bodies import SHAPES, Body, RandomBodies
 from kinarm.body_motion import BodyMotion
+from kinarm.problem import ReachProblem
 from kinarm.scene import PAPER_GOALS, Scene
+
+CLUTTER = RandomBodies(
+    name="box",
+    shape="box",
+    count=(2, 5),
+    smallest=(0.05, 0.05, 0.1),
+    largest=(0.2, 0.2, 0.4),
+    near="path",
+    lower=(-0.1, -0.1, -0.1),
+    upper=(0.1, 0.1, 0.1),
+    turned="any",
+)
+"""Boxes around the way from start to goal."""
+
+
+def among(name, bodies):
+    """A problem whose scene also has random bodies."""
+    problem = ReachProblem.load(name)
+    return problem.replace(scene=replace(problem.scene, random_bodies=(bodies,)))
+
+
+def swinging(speed):
+    """Two balls that swing through the arm's space at a speed along x and y [m/s]."""
+    ways = ((0.5, 0.35, 0.35, 0.0), (1.5, -0.35, -0.35, 0.0), (2.0, 0.0, 0.0, 0.0))
+    waypoints = tuple((0.7 * time / speed, *offset) for time, *offset in ways)
+    return RandomBodies(
+        name="ball",
+        shape="sphere",
+        count=(2, 2),
+        smallest=(0.08,),
+        largest=(0.15,),
+        near="path",
+        lower=(-0.3, -0.3, -0.3),
+        upper=(0.3, 0.3, 0.3),
+        motion=BodyMotion(waypoints=waypoints, periodic=True),
+    )
 
 
 def random_body(rng, name, shape, reach=0.8, largest=0.2):

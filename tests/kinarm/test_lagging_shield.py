@@ -1,16 +1,12 @@
 """Shields of joints that lag, and of bodies that move: what follows from a step counts."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
+from random_scenes import among, swinging
 from reference_episodes import held_actions
 
-from kinarm.bodies import RandomBodies
-from kinarm.body_motion import BodyMotion
 from kinarm.kernels.plant import COMMAND, MOST_CHANGE, RATE, STEADY
 from kinarm.plant import Plant
-from kinarm.problem import ReachProblem
 from kinarm.reference_plant import ReferencePlant
 from kinarm.shield import shield_table
 from kinarm.simulator import Simulator
@@ -125,34 +121,9 @@ def test_joints_settle_as_far_as_is_claimed(simulator):
     assert tried == 40
 
 
-def sweeping(speed):
-    """The paper's task among two balls that swing through the arm's space at a speed [m/s]."""
-    way = BodyMotion(
-        waypoints=(
-            (0.5 / speed, 0.35, 0.35, 0.0),
-            (1.5 / speed, -0.35, -0.35, 0.0),
-            (2.0 / speed, 0.0, 0.0, 0.0),
-        ),
-        periodic=True,
-    )
-    balls = RandomBodies(
-        name="ball",
-        shape="sphere",
-        count=(2, 2),
-        smallest=(0.08,),
-        largest=(0.15,),
-        near="path",
-        lower=(-0.3, -0.3, -0.3),
-        upper=(0.3, 0.3, 0.3),
-        motion=way,
-    )
-    problem = ReachProblem.load("right")
-    return problem.replace(scene=replace(problem.scene, random_bodies=(balls,)))
-
-
 @pytest.mark.parametrize("plant", ["ideal", Plant(bandwidth=20.0)])
 def test_arms_stay_away_from_bodies_that_move(plant):
-    simulator = Simulator(sweeping(0.5), threads=1).with_plant(plant)
+    simulator = Simulator(among("right", swinging(0.35)), threads=1).with_plant(plant)
     actions, starts, goals = drawn(simulator, 200)
     bare, safe = (
         each.rollout_actions(actions, starts, goals) for each in (simulator, simulator.shielded())

@@ -1,39 +1,20 @@
 """The shield: no step touches, none is replaced without need, and the nearest takes its place."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from known_arms import INSTALLED
+from random_scenes import CLUTTER, among
 from reference_episodes import held_actions
 
-from kinarm.bodies import RandomBodies
 from kinarm.problem import ReachProblem
 from kinarm.shield import shield_table
 from kinarm.simulator import Simulator
 from kinarm.world import World
 
-CLUTTER = RandomBodies(
-    name="box",
-    shape="box",
-    count=(2, 5),
-    smallest=(0.05, 0.05, 0.1),
-    largest=(0.2, 0.2, 0.4),
-    near="path",
-    lower=(-0.1, -0.1, -0.1),
-    upper=(0.1, 0.1, 0.1),
-    turned="any",
-)
-
-
-def cluttered(name):
-    problem = ReachProblem.load(name)
-    return problem.replace(scene=replace(problem.scene, random_bodies=(CLUTTER,)))
-
 
 @pytest.fixture(params=["right", "cluttered", pytest.param("benches-ur5", marks=INSTALLED)])
 def simulator(request):
-    problem = cluttered("right") if request.param == "cluttered" else request.param
+    problem = among("right", CLUTTER) if request.param == "cluttered" else request.param
     return Simulator(problem, threads=2)
 
 
