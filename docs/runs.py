@@ -23,7 +23,7 @@ from sphinx.application import Sphinx
 from sphinx.errors import ExtensionError
 from sphinx.util.docutils import SphinxDirective
 
-from kinarm.viewer.pages import HtmlPage
+from kinarm.viewer.html_page import HtmlPage
 
 TERMINAL = {"COLUMNS": "92", "LINES": "40", "TERM": "dumb"}
 """The terminal in which commands run, for programs that ask."""

@@ -44,9 +44,9 @@ def add_options(
     A field's metadata may hold ``flag`` (another name of the option; without
     dashes, of a positional argument), ``bare`` (values are also taken without
     the option), ``metavar``, ``repeat`` (repetitions of the option give a
-    tuple, else its several values), ``parse`` (makes the value of the text),
-    ``names`` (lists names for help and completion; those given here come first)
-    and ``completes`` (lists them for completion alone).
+    tuple, else its several values), ``nargs`` (how many of these),
+    ``parse`` (makes the value of the text), ``names`` (lists names for help and
+    completion; those given here come first) and ``completes`` (lists them for completion alone).
 
     With ``explicit``, help says every default, and what is false by default has
     ``--no-x``. Fields to ``skip`` get no option.
@@ -118,7 +118,7 @@ def _value_options(item: Field[Any], hint: Any, flag: str) -> dict[str, Any]:
         if item.metadata.get("repeat"):
             options = {"action": "append"}
         elif Ellipsis in others:
-            options = {"action": "extend", "nargs": "+"}
+            options = {"action": "extend", "nargs": item.metadata.get("nargs", "+")}
         else:
             options = {"nargs": 1 + len(others)}
     if get_origin(hint) is Literal:

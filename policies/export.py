@@ -86,16 +86,10 @@ def export_policy(
         raise refused
     world = World(policy.problem, threads=1)
     policy.check_arm(world.arm)
-    if world.layout.sees_bodies:
-        seen = [name for name in ("proximity", "obstacles") if name in world.layout.places]
-        raise InvalidInputError(
-            f"the policy sees {' and '.join(seen)}; only policies that see no bodies are exported"
-        )
-    content, packed = policy_content(policy), io.BytesIO()
+    contract, packed = contract_of(policy, world, sign, offset), io.BytesIO()
+    content = policy_content(policy)
     save_archive(packed, "policy", FORMAT_VERSION, content.arrays, content.header, compress=True)
-    contract = _contract(policy, world, *_wiring(world.arm, sign, offset))
     contract["policy"]["sha256"] = hashlib.sha256(packed.getvalue()).hexdigest()
-    contract["self_test"] = _self_test(policy, world, contract)
     files = _onnx_files(policy, content.arrays, contract) if onnx else {}
     contract["onnx"] = [*files]
     contract["digest"] = arm_policy.digest_of(contract)
@@ -120,9 +114,24 @@ def _wiring(arm: Arm, sign: ArrayLike | None, offset: ArrayLike | None) -> tuple
     return signs, np.zeros(shape) if offset is None else finite_array("offset", offset, shape)
 
 
-def _contract(policy: Policy, world: World, sign: Array, offset: Array) -> dict[str, Any]:
-    """What somebody who runs the policy has to know, and the runtime reads."""
-    problem, arm, layout, made = policy.problem, world.arm, world.layout, policy.provenance
+def contract_of(
+    policy: Policy,
+    world: World,
+    sign: ArrayLike | None = None,
+    offset: ArrayLike | None = None,
+) -> dict[str, Any]:
+    """What somebody who runs the policy in a world has to know, a runtime reads, and a self-test.
+
+    Sign and offset are those of `export_policy`. InvalidInputError if the policy sees bodies.
+    """
+    problem, arm, layout, made = world.problem, world.arm, world.layout, policy.provenance
+    if layout.sees_bodies:
+        seen = [name for name in ("proximity", "obstacles") if name in layout.places]
+        raise InvalidInputError(
+            f"the policy sees {' and '.join(seen)}; without kinarm, only policies run that see no "
+            "bodies"
+        )
+    signs, offsets = _wiring(arm, sign, offset)
     task, plant, dt, rules = problem.task, problem.plant, problem.stepping.time_step, world.rules
     slides = arm.chain.prismatic.tolist()
     columns = {
@@ -134,8 +143,8 @@ def _contract(policy: Policy, world: World, sign: Array, offset: Array) -> dict[
         "upper": arm.upper.tolist(),
         "velocity_limit": arm.velocity_limits.tolist(),
         "home": arm.home.tolist(),
-        "sign": sign.tolist(),
-        "offset": offset.tolist(),
+        "sign": signs.tolist(),
+        "offset": offsets.tolist(),
         **{each: getattr(arm.chain, each).tolist() for each in ("translation", "rotation", "axis")},
     }
     tool = {"position": arm.chain.tool, "rotation": rules.goal.frame, "axis": rules.goal.axis}
@@ -146,7 +155,7 @@ def _contract(policy: Policy, world: World, sign: Array, offset: Array) -> dict[
     memory = layout.history > 1 or not WITH_MEMORY.isdisjoint(layout.places)
     kind, side = task.goal.kind, None if policy.mirror is None else policy.mirror.side
     meant = {"kind": kind, "is": GOALS[kind], "length": world.goal_width}
-    return {
+    contract = {
         "made_by": f"kinarm {kinarm.__version__}",
         "policy": {
             "name": f"{made.algorithm} {made.recipe}",
@@ -175,6 +184,7 @@ def _contract(policy: Policy, world: World, sign: Array, offset: Array) -> dict[
         "shield": problem.stepping.shield,
         "resolution": 0.0 if isinstance(plant.resolution, tuple) else plant.resolution,
     }
+    return contract | {"self_test": _self_test(policy, world, contract)}
 
 
 def _self_test(

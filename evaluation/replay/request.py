@@ -20,7 +20,12 @@ from kinarm.problem_options import ProblemOptions, say_choices
 
 if TYPE_CHECKING:
     from kinarm.recording import Recording
-    from kinarm.viewer import ReplayPage
+    from kinarm.viewer.html_page import HtmlPage
+
+NOT_PLAYED = (
+    "source policy wrapper compare trial worst collisions failures oracle record live port browser"
+)
+"""Fields without meaning for a playground."""
 
 ALTERNATIVES = ("policy compare", "trial worst collisions failures")
 """Fields that exclude each other."""
@@ -29,13 +34,16 @@ NOT_LIVE = "source compare trial worst collisions failures trials out record"
 NOT_FROM_FILE = f"{ProblemOptions.CHANGES.removeprefix('arm ')} seed trials"
 """Fields without meaning for the live page, and for trials from a file."""
 
-PAGE, GENERATOR = "replay.html", b'<meta name="generator" content="kinarm">'
-"""Default page, and what pages of kinarm begin with."""
+PAGE, PLAYGROUND = "replay.html", "play.html"
+"""Default pages."""
+
+GENERATOR = b'<meta name="generator" content="kinarm">'
+"""What pages of kinarm begin with."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class ReplayRequest(ProblemOptions):
-    """Write one HTML file that replays trials offline, or show them live.
+    """Write one HTML file that replays trials offline, or plays policies; or show them live.
 
     Parameters
     ----------
@@ -67,6 +75,9 @@ class ReplayRequest(ProblemOptions):
         Trials that are run.
     seed : int
         Seed of the trials.
+    play : tuple of str
+        Make a page in which these policies run instead, whose goal and
+        obstacles one moves.
     allow_other_arm : bool
         Allow an arm that a policy was not trained for.
     oracle : bool
@@ -108,6 +119,10 @@ class ReplayRequest(ProblemOptions):
     failures: bool = False
     trials: int | None = None
     seed: int | None = field(default=None, metadata=FROM_ZERO)
+    play: tuple[str, ...] | None = field(
+        default=None,
+        metadata={"metavar": "POLICY", "nargs": "*", "completes": policy_choices},
+    )
     allow_other_arm: bool = False
     oracle: bool = True
     out: Path | None = None
@@ -120,7 +135,7 @@ class ReplayRequest(ProblemOptions):
     SHIELDS_POLICIES: ClassVar = True
 
     GROUPS: ClassVar = {
-        "what is replayed": "source policy vec_normalize wrapper compare allow_other_arm",
+        "what is replayed": "source policy vec_normalize wrapper compare play allow_other_arm",
         "which trials": "trials seed trial worst collisions failures oracle",
         "output": "out record overwrite live port browser",
         **ProblemOptions.GROUPS,
@@ -129,9 +144,10 @@ class ReplayRequest(ProblemOptions):
         **ProblemOptions.DEFAULTS,
         "problem": "what the policy was trained for",
         "policy": "with --failures, best",
-        "trials": "5; 200 to choose from, 10000 for --failures",
+        "trials": "5; 200 to choose from, 10000 for --failures, 20 for --play",
+        "play": "without names, four that ship",
         "seed": "0",
-        "out": PAGE,
+        "out": f"{PAGE}, or {PLAYGROUND} for --play",
         "port": "7000, or the next free one",
     }
 
@@ -146,6 +162,7 @@ class ReplayRequest(ProblemOptions):
                 raise InvalidInputError(f"{given[0]} and {given[1]} exclude each other")
         if self.port is not None and not self.live:
             raise InvalidInputError("--port goes with --live")
+        self._refuse("--play", NOT_PLAYED if self.play is not None else "")
         self._refuse("--live", NOT_LIVE if self.live else "")
         self._refuse("trials from a file", NOT_FROM_FILE if self.source else "")
         if self.source is not None and self.source.suffix == ".json":
@@ -165,7 +182,7 @@ class ReplayRequest(ProblemOptions):
         )
         return ["a file" if item.name == "source" else option_name(item) for item in given]
 
-    def run(self, report: Callable[[str], object] = lambda _: None) -> "ReplayPage | None":
+    def run(self, report: Callable[[str], object] = lambda _: None) -> "HtmlPage | None":
         """Write the page, and the recordings if asked for, and return it.
 
         Or serve the live page until interrupted.
@@ -184,7 +201,7 @@ class ReplayRequest(ProblemOptions):
         if self.live:
             self._serve(report)
             return None
-        return self._write(report)
+        return self._write(report) if self.play is None else self._write_playground(report)
 
     def recordings(self) -> "list[list[Recording]]":
         """Make or read the recordings to play, a list for each policy.
@@ -198,14 +215,29 @@ class ReplayRequest(ProblemOptions):
 
         return chosen_recordings(self).runs
 
-    def _write(self, report: Callable[[str], object]) -> "ReplayPage":
+    def _checked_out(self, usual: str) -> Path:
+        """The page to write; a page of kinarm with the default name is replaced."""
+        out = self.out or Path(usual)
+        own = self.out is None and out.is_file() and GENERATOR in out.read_bytes()[:2000]
+        check_output(out, overwrite=self.overwrite or own)
+        return out
+
+    def _write_playground(self, report: Callable[[str], object]) -> "HtmlPage":
+        from kinarm.evaluation.replay.playground import playground
+
+        out = self._checked_out(PLAYGROUND)
+        with working("making the page"):
+            page = playground(self)
+        page.save(out)
+        report(f"written: {out}, {len(page.html) / 1e6:.1f} MB, runs offline in any browser")
+        return page
+
+    def _write(self, report: Callable[[str], object]) -> "HtmlPage":
         from kinarm.evaluation.replay.choosing import chosen_recordings
         from kinarm.recording import save_recordings
         from kinarm.viewer import replay_page
 
-        out = self.out or Path(PAGE)
-        own = self.out is None and out.is_file() and GENERATOR in out.read_bytes()[:2000]
-        check_output(out, overwrite=self.overwrite or own)
+        out = self._checked_out(PAGE)
         if self.record is not None:
             check_output(self.record, overwrite=self.overwrite, suffix=".npz")
         with working("recording"):

@@ -1,8 +1,6 @@
 "use strict";
 
 const MOST_NAMED = 4; // pairs that are named when many touch
-const FREE = ["Free", "m5 12.5 4.5 4.5L19 7.5"];
-const CONTACT = ["Contact", "M6 6l12 12M18 6 6 18"];
 const TURN = Math.PI / 180;
 
 /* ---------- the stage of an arm that is moved by hand ---------- */
@@ -46,17 +44,16 @@ class ArmStage extends Stage {
 
 /* ---------- sliders, card and keys ---------- */
 
-class ArmControls {
+class ArmControls extends Controls {
   constructor(stage, data) {
-    this.stage = stage;
-    this.data = data;
+    super(stage, data);
     this.contact = new ContactTest(data);
     this.withShapes = false;
     this.sliders = data.joints.map((name, k) => this.slider(name, k));
     element("name").textContent = data.arm;
     element("eyebrow").textContent = `${count(data.joints.length, "joint")} · reach at most ${data.reach.toFixed(2)} m`;
-    this.connect();
-    this.setTheme(window.matchMedia("(prefers-color-scheme: dark)").matches ? "dark" : "light");
+    this.connect(this.actions);
+    this.preferTheme();
     this.set(data.home);
   }
 
@@ -103,7 +100,7 @@ class ArmControls {
     const names = this.touching.map((pair) => pair.join(" touches "));
     const more = names.length - MOST_NAMED;
     const shown = more > 0 ? [...names.slice(0, MOST_NAMED), `and ${count(more, "other pair")}`] : names;
-    element("verdict").replaceChildren(names.length ? badge("collision", ...CONTACT) : badge("free", ...FREE));
+    element("verdict").replaceChildren(names.length ? badge("collision", ...BADGES.collision) : badge("free", ...BADGES.free));
     element("touching").replaceChildren(...shown.map((text) => make("li", {}, text)));
     const spoken = names[0] || "Nothing touches";
     if (element("spoken").textContent !== spoken) {
@@ -117,53 +114,40 @@ class ArmControls {
     this.stage.show(this.configuration, this.pairs, shown);
   }
 
-  setTheme(name) {
-    this.theme = name;
-    document.documentElement.dataset.theme = name;
-    this.stage.theme(name);
-  }
-
-  connect() {
-    this.actions = {
+  get actions() {
+    return {
       home: () => this.set(this.data.home),
       shapes: () => this.showShapes(!this.withShapes),
       view: () => this.stage.look(1),
-      theme: () => this.setTheme(this.theme === "dark" ? "light" : "dark"),
+      theme: () => this.toggleTheme(),
       help: toggleKeys,
     };
-    for (const [id, action] of Object.entries(this.actions)) {
-      element(id).addEventListener("click", action);
-    }
-    document.addEventListener("keydown", (event) => this.press(event));
   }
 
-  press(event) {
-    if (event.ctrlKey || event.metaKey || event.altKey) {
-      return;
-    }
+  owns() {
+    return false; // the page moves sliders itself
+  }
+
+  get keys() {
+    const { actions } = this;
     const chosen = this.sliders.findIndex(({ input }) => input === document.activeElement);
     const choose = (k) => this.sliders[Math.min(Math.max(k, 0), this.sliders.length - 1)].input.focus();
-    const step = (way) => {
+    const step = (way) => (event) => {
       const k = Math.max(chosen, 0);
       choose(k);
       this.move(k, this.configuration[k] + way * (this.data.axes[k].slides ? 0.005 : TURN) * (event.shiftKey ? 10 : 1));
     };
-    const keys = {
+    return {
       ArrowUp: () => choose(chosen - 1),
       ArrowDown: () => choose(chosen + 1),
-      ArrowLeft: () => step(-1),
-      ArrowRight: () => step(1),
-      h: this.actions.home,
-      c: this.actions.shapes,
-      r: this.actions.view,
-      t: this.actions.theme,
-      "?": this.actions.help,
+      ArrowLeft: step(-1),
+      ArrowRight: step(1),
+      h: actions.home,
+      c: actions.shapes,
+      r: actions.view,
+      t: actions.theme,
+      "?": actions.help,
     };
-    const action = keys[event.key.length > 1 ? event.key : event.key.toLowerCase()];
-    if (action) {
-      event.preventDefault();
-      action();
-    }
   }
 
   get state() {

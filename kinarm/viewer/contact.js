@@ -3,63 +3,17 @@
 /* ---------- contact: distances between convex shapes by Gilbert, Johnson and Keerthi's way ---------- */
 
 const CLOSE = 5e-7; // bodies this far apart touch: half of the distance that Coal may take for none [m]
+const TOUCHING = 1e-6; // bodies that come this close in a motion touch, as in `kinarm.motion_contact` [m]
+const TOLD_APART = 2.5e-7; // distances that differ less are the same there [m]
 const NARROW = 1e-10; // bounds of a distance that are this close decide [m]
 const MOST_CUTS = 200;
 
-const dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-const minus = (a, b) => [a[0] - b[0], a[1] - b[1], a[2] - b[2]];
-const cross = (a, b) => [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
 const mixed = (points, weights) => [0, 1, 2].map((k) => points.reduce((sum, point, n) => sum + weights[n] * point[k], 0));
-
-/** Poses of an arm's joints as rows [R | t], the world's first. */
-class Kinematics {
-  constructor(axes) {
-    this.axes = axes;
-  }
-
-  poses(configuration) {
-    const poses = [[1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0]];
-    this.axes.forEach((axis, k) => {
-      const fixed = pose(axis.rotation, axis.translation);
-      const [x, y, z] = axis.axis;
-      const value = configuration[k];
-      const sine = Math.sin(value / 2);
-      const moved = axis.slides
-        ? pose([1, 0, 0, 0], [value * x, value * y, value * z])
-        : pose([Math.cos(value / 2), sine * x, sine * y, sine * z], [0, 0, 0]);
-      poses.push(chained(chained(poses[k], fixed), moved));
-    });
-    return poses;
-  }
-}
-
-function pose([w, x, y, z], [a, b, c]) {
-  return [
-    1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y), a,
-    2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x), b,
-    2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y), c,
-  ];
-}
-
-function chained(first, second) {
-  const product = [];
-  for (const row of [0, 4, 8]) {
-    for (let column = 0; column < 4; column++) {
-      product.push(
-        first[row] * second[column] + first[row + 1] * second[column + 4] + first[row + 2] * second[column + 8]
-        + (column === 3 ? first[row + 3] : 0));
-    }
-  }
-  return product;
-}
-
-const placed = (m, [x, y, z]) => [m[0] * x + m[1] * y + m[2] * z + m[3], m[4] * x + m[5] * y + m[6] * z + m[7], m[8] * x + m[9] * y + m[10] * z + m[11]];
-const unturned = (m, [x, y, z]) => [m[0] * x + m[4] * y + m[8] * z, m[1] * x + m[5] * y + m[9] * z, m[2] * x + m[6] * y + m[10] * z];
 
 /** The hull of points, or of two discs, widened by a radius, carried by a joint. */
 class Body {
   constructor({ name, joint, points, discs, radius }) {
-    Object.assign(this, { name, joint, points, discs, radius });
+    Object.assign(this, { name, joint, points, discs, radius, standing: WORLD });
     this.axis = discs ? minus(points[1], points[0]).map((value, _, all) => value / Math.hypot(...all)) : null;
     const [low, high] = [Math.min, Math.max].map((end) => [0, 1, 2].map((k) => end(...points.map((point) => point[k]))));
     this.middle = low.map((value, k) => (value + high[k]) / 2);
@@ -67,7 +21,7 @@ class Body {
   }
 
   place(poses) {
-    this.pose = poses[this.joint];
+    this.pose = this.joint ? poses[this.joint] : this.standing;
     this.centre = placed(this.pose, this.middle);
   }
 
@@ -130,22 +84,26 @@ function nearest(simplex) {
   return found;
 }
 
-/** Where two bodies touch, or null; see Gilbert, Johnson and Keerthi (1988). */
-function touch(first, second) {
+/**
+ * Distance of two bodies [m] and a point between; see Gilbert, Johnson and Keerthi (1988).
+ * Beyond `enough`, any lower bound that is larger, and no point.
+ */
+function nearness(first, second, enough) {
   const radius = first.radius + second.radius;
   const between = minus(first.centre, second.centre);
-  if (Math.hypot(...between) > first.extent + second.extent) {
-    return null;
+  const far = Math.hypot(...between);
+  if (far > first.extent + second.extent + enough) {
+    return { apart: far - first.extent - second.extent };
   }
   let simplex = [];
-  let found = { point: dot(between, between) > 0 ? between : [1, 0, 0] };
+  let found = { point: far > 0 ? between : [1, 0, 0] };
   found.length = Math.hypot(...found.point);
   for (let cut = 0; cut < MOST_CUTS; cut++) {
     const [a, b] = [first.support(found.point.map((value) => -value)), second.support(found.point)];
     const corner = { a, b, apart: minus(a, b) };
     const least = dot(corner.apart, found.point) / found.length;
-    if (least > radius + CLOSE) {
-      return null;
+    if (least > radius + enough) {
+      return { apart: least - radius };
     }
     const known = simplex.some((other) => other.apart.every((value, k) => value === corner.apart[k]));
     if (simplex.length > 0 && (found.length - least < NARROW || known)) {
@@ -162,37 +120,95 @@ function touch(first, second) {
       break;
     }
   }
-  if (found.length > radius + CLOSE) {
-    return null;
-  }
   const [a, b] = ["a", "b"].map((end) => mixed(simplex.map((corner) => corner[end]), found.weights));
   const share = radius > 0 ? first.radius / radius : 0;
-  return a.map((value, k) => value + share * (b[k] - value));
+  return { apart: found.length - radius, point: a.map((value, k) => value + share * (b[k] - value)) };
 }
 
-/** Where a body touches the ground, or null. */
-function touchGround(body) {
-  const lowest = body.support([0, 0, -1]);
-  return lowest[2] <= body.radius ? [lowest[0], lowest[1], Math.min(lowest[2] - body.radius, 0)] : null;
+/** Height of a body above a half-space [m], and its lowest point, on or below the surface. */
+function height(body, { normal, offset }) {
+  const lowest = body.support(normal.map((value) => -value));
+  const apart = dot(normal, lowest) - offset - body.radius;
+  return { apart, point: lowest.map((value, k) => value - normal[k] * (body.radius + Math.max(apart, 0))) };
 }
 
 /** Pairs of an arm in a scene that touch, as in kinarm's own model of contact. */
 class ContactTest {
-  constructor({ axes, bodies, pairs }) {
+  constructor({ axes, bodies, pairs, travel }) {
     this.kinematics = new Kinematics(axes);
     this.bodies = bodies.map((body) => (body.points ? new Body(body) : body));
     this.pairs = pairs;
+    this.travel = travel; // how far a joint moves the bodies of a pair at most, as in `ContactShapes`
+  }
+
+  /** Distance of a pair; see `nearness`. */
+  apart(pair, poses, enough) {
+    const [first, second] = this.pairs[pair].map((number) => this.bodies[number]);
+    first.place(poses);
+    if (!second.points) {
+      return height(first, second);
+    }
+    second.place(poses);
+    return nearness(first, second, enough);
   }
 
   /** All pairs [first, second, point] that touch at a configuration. */
   at(configuration) {
     const poses = this.kinematics.poses(configuration);
-    const { bodies } = this;
-    bodies.forEach((body) => body.points && body.place(poses));
-    return this.pairs.flatMap(([first, second]) => {
-      const [one, other] = [bodies[first], bodies[second]];
-      const point = other.points ? touch(one, other) : touchGround(one);
-      return point ? [[first, second, point]] : [];
+    return this.pairs.flatMap((bodies, pair) => {
+      const { apart, point } = this.apart(pair, poses, CLOSE);
+      return apart <= CLOSE ? [[...bodies, point]] : [];
     });
+  }
+
+  /** Whether no pair touches while joints stay within reaches of a configuration [rad or m]. */
+  isFreeAbout(configuration, reaches) {
+    const poses = this.kinematics.poses(configuration);
+    return this.pairs.every((_, pair) => {
+      const enough = TOUCHING + TOLD_APART + this.way(pair, reaches);
+      return this.apart(pair, poses, enough).apart > enough;
+    });
+  }
+
+  way(pair, moves) {
+    return this.travel.reduce((sum, row, k) => sum + row[pair] * Math.abs(moves[k]), 0);
+  }
+
+  /**
+   * What touches first in a straight motion, as { share, pair, point }, or null: from distance to
+   * distance, as far as the pair cannot close it (conservative advancement, Mirtich 1996).
+   * One pair, if given, is looked at before the others, and the first one found is told.
+   */
+  inMotion(start, end, before = null) {
+    const moves = end.map((value, k) => value - start[k]);
+    const begun = this.kinematics.poses(start);
+    let first = null;
+    for (const pair of before === null ? this.pairs.keys() : [before, ...this.pairs.keys()]) {
+      const found = this.pairInMotion(pair, start, moves, begun);
+      if (found && (!first || found.share < first.share)) {
+        first = found;
+      }
+      if (found && before !== null) {
+        break;
+      }
+    }
+    return first;
+  }
+
+  pairInMotion(pair, start, moves, begun) {
+    const way = this.way(pair, moves);
+    for (let share = 0, poses = begun; share <= 1 && way > 0; ) {
+      const left = way * (1 - share) + TOUCHING;
+      const { apart, point } = this.apart(pair, poses, left);
+      if (apart > left) {
+        return null;
+      }
+      if (apart < TOUCHING + TOLD_APART) {
+        return { share, pair, point };
+      }
+      share += (apart - TOUCHING) / way;
+      poses = this.kinematics.poses(start.map((value, k) => value + share * moves[k]));
+    }
+    return null;
   }
 }

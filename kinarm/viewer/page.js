@@ -49,9 +49,64 @@ function badge(kind, words, shape) {
   return node;
 }
 
+const BADGES = {
+  success: ["Reached", "m5 12.5 4.5 4.5L19 7.5"],
+  collision: ["Contact", "M6 6l12 12M18 6 6 18"],
+  truncated: ["Truncated", "M12 6v6.5l4 2.5M12 3a9 9 0 1 0 .01 0"],
+  free: ["Free", "m5 12.5 4.5 4.5L19 7.5"],
+  moving: ["Moving", "M5 12h14M13 6l6 6-6 6"],
+};
+
 function toggleKeys() {
   element("keys").hidden = !element("keys").hidden;
   element("help").setAttribute("aria-expanded", String(!element("keys").hidden));
+}
+
+/** What buttons and keys of a page do; pages have their own `keys`. */
+class Controls {
+  constructor(stage, data) {
+    this.stage = stage;
+    this.data = data;
+  }
+
+  setTheme(name) {
+    this.theme = name;
+    document.documentElement.dataset.theme = name;
+    this.stage.theme(name);
+  }
+
+  toggleTheme() {
+    this.setTheme(this.theme === "dark" ? "light" : "dark");
+  }
+
+  preferTheme() {
+    this.setTheme(window.matchMedia("(prefers-color-scheme: dark)").matches ? "dark" : "light");
+  }
+
+  /** Connect buttons, by their ids, with actions, and keys. */
+  connect(actions) {
+    for (const [id, action] of Object.entries(actions)) {
+      element(id).addEventListener("click", action);
+    }
+    document.addEventListener("keydown", (event) => this.press(event));
+  }
+
+  /** Whether what has the focus takes a key for itself. */
+  owns({ tagName }, key) {
+    const presses = key === " " || key === "Enter";
+    return { SELECT: true, INPUT: key !== " " && key.length > 1, BUTTON: presses, SUMMARY: presses }[tagName] ?? false;
+  }
+
+  press(event) {
+    if (event.ctrlKey || event.metaKey || event.altKey || this.owns(event.target, event.key)) {
+      return;
+    }
+    const action = this.keys[event.key.length > 1 ? event.key : event.key.toLowerCase()];
+    if (action) {
+      event.preventDefault();
+      action(event);
+    }
+  }
 }
 
 /** Show the page that a function makes of the viewer and the data, or say why there is none. */

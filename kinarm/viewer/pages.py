@@ -1,24 +1,15 @@
 """Pages of recordings and arms: HTML that needs WebGL, but no network."""
 
-import base64
-import gzip
-import json
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from functools import lru_cache
-from importlib import resources
 from pathlib import Path
 from typing import Any
 
 import coal
 import numpy as np
 import pinocchio as pin
-from jinja2 import Environment, FunctionLoader, StrictUndefined
-from markupsafe import Markup
 from numpy.typing import ArrayLike, NDArray
 
-from kinarm._files import write_text
 from kinarm.arm import Arm
 from kinarm.arm_specification import ArmSpecification
 from kinarm.body_motion import BodyMotion
@@ -38,18 +29,10 @@ from kinarm.viewer.drawing import (
     draw_trace,
     put,
 )
+from kinarm.viewer.html_page import HtmlPage, page_html
 from kinarm.viewer.parts import PAGE_COLOURS, TRACE_SIDES, goal_pose
 from kinarm.viewer.visual_shapes import arm_parts, collision_parts, link_joints
 from kinarm.world import World
-
-NOTEBOOK_HEIGHT = 560
-"""Height of a page in a notebook [pixels]."""
-
-NOTEBOOK_FRAME = Markup(
-    '<iframe srcdoc="{}" title="{}" '
-    'style="width: 100%; height: {}px; border: 0; border-radius: 8px" '
-    'loading="lazy" allowfullscreen></iframe>'
-)
 
 NEARER = 0.8
 """Camera's distance from an arm alone, as a share of that in replays."""
@@ -58,49 +41,6 @@ RUN_FIELDS = ("policy", "outcome", "contact", "replaced")
 """What scripts know of a recording as it is."""
 
 BARE_GROUND = Scene(obstacles=(), goal_regions=())
-
-
-@dataclass(frozen=True)
-class HtmlPage:
-    """A page whose ``html`` refers to nothing else. A notebook shows it."""
-
-    html: str
-
-    def save(self, path: str | Path) -> None:
-        """Write the page to a file, or leave an existing one as it was."""
-        write_text(path, self.html)
-
-    def __repr__(self) -> str:
-        return f"{type(self).__name__}({len(self.html) / 1e6:.1f} MB of HTML)"
-
-    def _repr_html_(self) -> str:
-        return NOTEBOOK_FRAME.format(self.html, type(self).__name__, NOTEBOOK_HEIGHT)
-
-
-def _page_html(
-    template: str, title: str, scene: bytes, data: Mapping[str, Any], parts: Sequence[str]
-) -> str:
-    """Fill a template, which extends ``page.html`` and has a style of its name.
-
-    The scene is framed commands to Meshcat's viewer, the data are what scripts have to know. Parts
-    are the scripts after those of every page.
-    """
-    described = json.dumps(data, separators=(",", ":"), sort_keys=True)
-    environment = Environment(
-        autoescape=True,
-        undefined=StrictUndefined,
-        keep_trailing_newline=True,
-        loader=FunctionLoader(_own_text),
-    )
-    return environment.get_template(f"{template}.html").render(
-        title=title,
-        style=_own_text("page.css") + _own_text(f"{template}.css"),
-        licence=Markup(_meshcat(".LICENSE.txt").decode().replace("--", "- -")),
-        meshcat=_gzip_base64(_meshcat()),
-        scene=_gzip_base64(scene),
-        data=_gzip_base64(described.encode()),
-        scripts=[_own_text(f"{name}.js") for name in ("page", "stage", *parts)],
-    )
 
 
 def arm_data(arm: Arm, scene: Scene) -> dict[str, Any]:
@@ -122,19 +62,26 @@ def arm_data(arm: Arm, scene: Scene) -> dict[str, Any]:
     }
 
 
-def _own_text(name: str) -> Markup:
-    """Text of a file beside this one, for a page."""
-    return Markup((resources.files("kinarm.viewer") / name).read_text(encoding="utf-8"))
-
-
-def _meshcat(ending: str = "") -> bytes:
-    """Meshcat's viewer, or what lies beside it."""
-    return (resources.files("meshcat") / f"viewer/dist/main.min.js{ending}").read_bytes()
-
-
-@lru_cache(maxsize=4)
-def _gzip_base64(content: bytes) -> str:
-    return base64.b64encode(gzip.compress(content, 9, mtime=0)).decode()
+def contact_data(model: ContactModel) -> dict[str, Any]:
+    """Describe what may touch: bodies, pairs, and how far joints move the bodies of a pair."""
+    bodies: list[dict[str, Any]] = []
+    for shape, name in zip(model.geometry.geometryObjects, model.body_names, strict=True):
+        body: dict[str, Any] = {"name": name, "joint": shape.parentJoint}
+        turn, place = shape.placement.rotation, shape.placement.translation
+        if isinstance(shape.geometry, coal.Halfspace):
+            body |= {"normal": turn[:, 2].tolist(), "offset": float(turn[:, 2] @ place)}
+        else:
+            # The hull of points in the joint's frame, widened by a radius or discs [m].
+            points, radius = core(shape)
+            discs = radius if isinstance(shape.geometry, coal.Cylinder) else 0.0
+            placed = points @ turn.T + place
+            body |= {"points": placed.tolist(), "discs": discs, "radius": radius - discs}
+        bodies.append(body)
+    return {
+        "bodies": bodies,
+        "pairs": [[pair.first, pair.second] for pair in model.geometry.collisionPairs],
+        "travel": model.shapes.travel.tolist(),
+    }
 
 
 class ReplayPage(HtmlPage):
@@ -204,7 +151,7 @@ def replay_page(
     }
     title = f"{' and '.join(policies)} · kinarm replay"
     scripts = ("replay_stage", "trial_list", "player")
-    page = ReplayPage(_page_html("player", title, drawn.content, data, scripts))
+    page = ReplayPage(page_html("player", title, drawn.content, data, scripts))
     if path is not None:
         page.save(path)
     return page
@@ -321,27 +268,16 @@ def arm_page(
     frames = draw_stage(drawn.window, arm, scene)
     for number, part in enumerate(collision_parts(arm)):
         put(frames[part.joint][f"shape_{number}"], SHAPE, part.mesh)
-    objects = zip(model.geometry.geometryObjects, model.body_names, strict=True)
-    bodies = []
-    for shape, name in objects:
-        bodies.append(body := {"name": name, "joint": shape.parentJoint})
-        if isinstance(shape.geometry, coal.Halfspace):
-            continue
-        # The hull of points in the joint's frame, widened by a radius or discs [m].
-        points, radius = core(shape)
-        placed = points @ shape.placement.rotation.T + shape.placement.translation
-        discs = radius if isinstance(shape.geometry, coal.Cylinder) else 0.0
-        body |= {"points": placed.tolist(), "discs": discs, "radius": radius - discs}
     data = arm_data(arm, scene) | {
         "joints": list(arm.joint_names),
         **{name: getattr(arm, name).tolist() for name in ("lower", "upper", "home")},
         "reach": arm.reach,
-        "bodies": bodies,
-        "pairs": [[pair.first, pair.second] for pair in model.geometry.collisionPairs],
+        **contact_data(model),
     }
     data["scale"] *= NEARER
     title = f"{arm.name} · kinarm arm"
-    page = ArmPage(_page_html("arm_page", title, drawn.content, data, ("contact", "arm_page")))
+    scripts = ("kinematics", "contact", "arm_page")
+    page = ArmPage(page_html("arm_page", title, drawn.content, data, scripts))
     if path is not None:
         page.save(path)
     return page

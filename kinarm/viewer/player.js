@@ -2,11 +2,6 @@
 
 const SPEEDS = [0.1, 0.25, 0.5, 1, 2];
 const HOLD = 1.4; // seconds between the end of a trial and the next one
-const BADGES = {
-  success: ["Reached", "m5 12.5 4.5 4.5L19 7.5"],
-  collision: ["Contact", "M6 6l12 12M18 6 6 18"],
-  truncated: ["Truncated", "M12 6v6.5l4 2.5M12 3a9 9 0 1 0 .01 0"],
-};
 
 /* ---------- the panels: card, plot and controls ---------- */
 
@@ -81,10 +76,9 @@ function drawPlot(trial, frames, colours) {
 
 /* ---------- the player ---------- */
 
-class Player {
+class Player extends Controls {
   constructor(stage, data) {
-    this.stage = stage;
-    this.data = data;
+    super(stage, data);
     this.speed = 0.25;
     this.playing = false;
     this.calm = window.matchMedia("(prefers-reduced-motion: reduce)").matches;
@@ -101,8 +95,9 @@ class Player {
     this.list = new TrialList(data, (index) => this.select(index));
     element("list-key").hidden = !data.groups.length;
     element("trial-choice").hidden = data.trials.length < 2;
-    this.connect();
-    this.setTheme(window.matchMedia("(prefers-color-scheme: dark)").matches ? "dark" : "light");
+    this.connect(this.actions);
+    this.takeInput();
+    this.preferTheme();
     this.select(0);
     requestAnimationFrame((now) => this.tick(now));
   }
@@ -171,12 +166,6 @@ class Player {
     element("speed").value = speed;
   }
 
-  setTheme(name) {
-    this.theme = name;
-    document.documentElement.dataset.theme = name;
-    this.stage.theme(name);
-  }
-
   tick(now) {
     const passed = Math.min((now - (this.before ?? now)) / 1000, 0.1);
     this.before = now;
@@ -202,22 +191,25 @@ class Player {
     }
   }
 
-  connect() {
-    const click = (id, action) => element(id).addEventListener("click", action);
-    click("play", () => this.toggle());
-    click("first", () => this.seek(0));
-    click("back", () => this.seek(Math.ceil(this.time) - 1));
-    click("forward", () => this.seek(Math.floor(this.time) + 1));
-    click("previous", () => this.select(this.index - 1));
-    click("next", () => this.select(this.index + 1));
-    click("view", () => this.stage.look(this.stage.side));
-    click("theme", () => this.setTheme(this.theme === "dark" ? "light" : "dark"));
-    click("help", toggleKeys);
+  get actions() {
+    return {
+      play: () => this.toggle(),
+      first: () => this.seek(0),
+      back: () => this.seek(Math.ceil(this.time) - 1),
+      forward: () => this.seek(Math.floor(this.time) + 1),
+      previous: () => this.select(this.index - 1),
+      next: () => this.select(this.index + 1),
+      view: () => this.stage.look(this.stage.side),
+      theme: () => this.toggleTheme(),
+      help: toggleKeys,
+    };
+  }
+
+  takeInput() {
     element("frame").addEventListener("input", (event) => this.seek(Number(event.target.value)));
     element("speed").addEventListener("change", (event) => this.setSpeed(Number(event.target.value)));
     element("trial").addEventListener("change", (event) => this.select(Number(event.target.value)));
     window.addEventListener("resize", () => drawPlot(this.trial, this.frames, this.data.colours) ?? this.show(this.time));
-    document.addEventListener("keydown", (event) => this.press(event));
     const plot = element("plot");
     const drag = (event) => {
       const bounds = plot.getBoundingClientRect();
@@ -238,33 +230,24 @@ class Player {
     }
   }
 
-  press(event) {
-    const tag = event.target.tagName;
-    const own = { SELECT: () => true, INPUT: (key) => key !== " " && key.length > 1, BUTTON: (key) => key === " " || key === "Enter", SUMMARY: (key) => key === " " || key === "Enter" };
-    if (event.ctrlKey || event.metaKey || event.altKey || (own[tag] && own[tag](event.key))) {
-      return;
-    }
+  get keys() {
+    const { actions } = this;
     const faster = (by) => this.setSpeed(SPEEDS[Math.min(Math.max(SPEEDS.indexOf(this.speed) + by, 0), SPEEDS.length - 1)]);
-    const actions = {
-      " ": () => this.toggle(),
-      ArrowLeft: () => this.seek(Math.ceil(this.time) - 1),
-      ArrowRight: () => this.seek(Math.floor(this.time) + 1),
-      Home: () => this.seek(0),
+    return {
+      " ": actions.play,
+      ArrowLeft: actions.back,
+      ArrowRight: actions.forward,
+      Home: actions.first,
       End: () => this.seek(this.frames),
-      p: () => this.select(this.index - 1),
-      n: () => this.select(this.index + 1),
+      p: actions.previous,
+      n: actions.next,
       l: () => this.list.toggle(),
       ",": () => faster(-1),
       ".": () => faster(1),
-      r: () => this.stage.look(this.stage.side),
-      t: () => this.setTheme(this.theme === "dark" ? "light" : "dark"),
-      "?": toggleKeys,
+      r: actions.view,
+      t: actions.theme,
+      "?": actions.help,
     };
-    const action = actions[event.key.length > 1 ? event.key : event.key.toLowerCase()];
-    if (action) {
-      event.preventDefault();
-      action();
-    }
   }
 
   get state() {
