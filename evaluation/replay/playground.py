@@ -2,7 +2,7 @@
 
 from typing import TYPE_CHECKING
 
-from kinarm.errors import InvalidInputError
+from kinarm.errors import InvalidInputError, KinarmError
 from kinarm.evaluation.contestants import Contestant
 from kinarm.evaluation.replay.choosing import named_contestants
 from kinarm.evaluation.trials import TrialSet
@@ -46,5 +46,9 @@ def _player(contestant: Contestant, world: World, request: "ReplayRequest") -> P
             f"{contestant.name!r} does not run in a page: it is no dense network of kinarm's, "
             "or needs more than its observation"
         )
-    contestant.check(world.problem, world.arm, allow_other_arm=request.allow_other_arm)
-    return PagePolicy(contestant.name, contract_of(policy, world), policy.networks())
+    try:
+        contestant.check(world.problem, world.arm, allow_other_arm=request.allow_other_arm)
+        contract = contract_of(policy, world)
+    except KinarmError as refused:
+        raise InvalidInputError(f"{contestant.name!r} does not run here: {refused}") from refused
+    return PagePolicy(contestant.name, contract, policy.networks())

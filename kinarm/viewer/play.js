@@ -45,7 +45,7 @@ class Playground extends Controls {
     choose("servo", (k) => { simulator.servo = simulator.servos[k]; });
     choose("delay", (steps) => { simulator.delay = steps; });
     element("speed").addEventListener("change", () => { this.speed = Number(element("speed").value); });
-    element("eyebrow").textContent = `${data.arm} · ${data.problem.name} · drag the cube`;
+    element("eyebrow").textContent = `${data.arm} · drag the cube, or an obstacle`;
     element("turn").hidden = element("turn-key").hidden = element("angle-row").hidden = simulator.task.kind === "position";
     element("shield").setAttribute("aria-pressed", String(simulator.shield));
   }
@@ -277,13 +277,14 @@ start((viewer, data) => {
     setGoal: (goal) => playground.setGoal(goal),
     moveObstacle: (number, offset) => { playground.moveObstacle(number, offset); playground.restart(); },
     step: () => { playground.step(); playground.show(); },
+    onScreen: (point) => stage.onScreen(point),
     lookFrom: (eye, target) => stage.lookFrom(eye, target),
     pose: (name) => stage.pose(name),
     census: () => stage.census(),
     get state() {
       const { state, trial, theme, playing, simulator, solution, replaced } = playground;
       const { q, goal, steps, outcome, distance } = state;
-      return { q, goal, steps, outcome, distance, trial, theme, playing, replaced, solution, policy: element("policy").selectedOptions[0].text, shield: simulator.shield, servo: simulator.servo.hertz, delay: simulator.delay };
+      return { q, goal, steps, outcome, distance, trial, theme, playing, replaced, solution, obstacles: stage.obstacles.map(({ position }) => position.toArray()), policy: element("policy").selectedOptions[0].text, shield: simulator.shield, servo: simulator.servo.hertz, delay: simulator.delay };
     },
   };
   playground.setPlaying(!playground.calm);

@@ -9,10 +9,11 @@ class PlayStage extends Stage {
   constructor(viewer, data) {
     super(viewer, data);
     const { THREE } = this;
-    this.solution = this.arm.ghost(data, 0x808890, 0.13);
+    this.solution = this.arm.ghost(data, 0x808890, 0.16);
     this.find("goal").traverse((node) => { node.castShadow = node.castShadow && node.material && !node.material.transparent; });
     this.obstacles = data.obstacles.map((body, k) => this.find("obstacles", String(k)));
-    this.trail = new THREE.Line(new THREE.BufferGeometry(), new THREE.LineBasicMaterial());
+    const way = new THREE.BufferAttribute(new Float32Array(3 * MOST_TRAIL), 3);
+    this.trail = new THREE.Line(new THREE.BufferGeometry().setAttribute("position", way), new THREE.LineBasicMaterial());
     this.trail.frustumCulled = false;
     this.find("goal").parent.add(this.trail);
     this.look(1);
@@ -34,7 +35,9 @@ class PlayStage extends Stage {
     }
     this.showGoal(state.goal);
     this.mesh("goal", "cube").material.emissive.set(state.outcome === "success" ? 0x0b6b50 : 0x000000);
-    this.trail.geometry.setFromPoints(way.slice(-MOST_TRAIL).map((point) => new this.THREE.Vector3(...point)));
+    const { geometry } = this.trail;
+    geometry.attributes.position.copyArray(way.slice(-MOST_TRAIL).flat()).needsUpdate = true;
+    geometry.setDrawRange(0, Math.min(way.length, MOST_TRAIL));
     const { touched, replaced } = state;
     this.flash.visible = Boolean(touched?.point);
     if (this.flash.visible) {
@@ -91,6 +94,13 @@ class PlayStage extends Stage {
       const met = this.ray(event).ray.intersectPlane(plane, new THREE.Vector3());
       return met && met.sub(point).applyQuaternion(viewer.scene.quaternion.clone().invert()).toArray();
     };
+  }
+
+  /** Where a point of the world is seen [pixels]. */
+  onScreen(point) {
+    this.viewer.render();
+    const { x, y } = this.viewer.scene.localToWorld(new this.THREE.Vector3(...point.slice(0, 3))).project(this.viewer.camera);
+    return [((1 + x) / 2) * window.innerWidth, ((1 - y) / 2) * window.innerHeight];
   }
 
   /** The camera's axes to the right, up and back, in the world. */

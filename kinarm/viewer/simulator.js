@@ -174,12 +174,19 @@ class Simulator {
     return { q: [...reached, ...q.slice(step.length)], drive: { command, velocity, former } };
   }
 
-  /** What touches in a step, or behind a shield until the joints rest while its command is held. */
+  /**
+   * What touches in a step, or behind a shield until the joints rest while its command is held.
+   * One pair, if given, is looked at first, and that where they will rest, which tells mostly.
+   */
   touchedBy(state, next, before = null) {
+    const rest = [...next.drive.command, ...next.q.slice(this.step.length)];
+    if (before !== null && this.contact.apart(before, this.kinematics.poses(rest), TOUCHING).apart <= TOUCHING) {
+      return { share: 1, pair: before };
+    }
     let found = this.contact.inMotion(state.q, next.q, before);
     for (let passed = 0; !found && this.shield && this.lags && !this.comesToRest(next, passed); passed++) {
       if (passed === MOST_STOPPING) {
-        return { share: 1, pair: 0, point: null };
+        return { share: 1, pair: 0 };
       }
       const after = this.moved(next, null);
       found = this.contact.inMotion(next.q, after.q, before);

@@ -6,11 +6,14 @@ from dataclasses import replace as changed_to
 import numpy as np
 import pytest
 from documents import outcomes_of
+from random_policies import policy_for
 from refusals import check_refused
 
 from kinarm.arm import Arm
 from kinarm.evaluation import ReplayRequest
+from kinarm.evaluation.replay.playground import PLAYED
 from kinarm.policies.library import best_policy
+from kinarm.problem import ReachProblem
 from kinarm.recording import load_recordings, save_recordings
 
 QUICK = ("--no-oracle",)
@@ -183,3 +186,50 @@ def test_an_evaluation_of_several_policies(replay, evaluation):
     check_refused(replay(evaluation, "--policy", "nobody"), "'nobody'", "random")
     check_refused(replay(evaluation, "--policy", "mine-seed0"), "is a file: name it with --policy")
     check_refused(replay(evaluation, "--policy", "random", "--problem", "left"), "'random'")
+
+
+class TestPlayground:
+    def test_page_of_two_policies(self, run, policy_folder, tmp_path, monkeypatch):
+        monkeypatch.chdir(tmp_path)
+        mine = policy_folder / "mine-seed0.npz"
+        answer = run("kinarm-replay", "--play", mine, "ppo-best-both", "--problem", "right")
+        assert answer.status == 0, answer.err
+        assert answer.out.startswith("written: play.html, ")
+        page = (tmp_path / "play.html").read_text()
+        assert page.startswith("<!DOCTYPE html>")
+        assert run("kinarm-replay", "--play", mine).status == 0
+        assert (tmp_path / "play.html").read_text() != page
+
+    @pytest.mark.parametrize(
+        ("words", "said"),
+        [
+            (("random",), "'random' does not run in a page"),
+            (("oracle",), "'oracle' does not run in a page"),
+            (("numpy:tanh",), "'numpy:tanh' does not run in a page"),
+            (("nobody",), "unknown policy 'nobody'"),
+            ((PLAYED[0], "--compare", "zero", "zero"), "--compare does not go with --play"),
+            ((PLAYED[0], "--wrapper", "a:b"), "--wrapper does not go with --play"),
+            ((PLAYED[0], "--live"), "--live does not go with --play"),
+            ((PLAYED[0], "--plant", "hard"), "it has a plant with more than one delay"),
+            ((PLAYED[0], "--arm", "paper_flange"), "was trained for arm 'paper', not for"),
+        ],
+    )
+    def test_what_does_not_play(self, replay, words, said, tmp_path):
+        check_refused(replay("--play", *words, "--problem", "both"), said)
+        assert not (tmp_path / "made.html").exists()
+
+    def test_policies_that_differ(self, replay, tmp_path):
+        """Another observation than the first one's, bodies that are seen, and another arm."""
+        both = ReachProblem.load("both")
+        for name, changed in (
+            ("angles", {"observation": ["goal", "joint_angles"]}),
+            ("near", {"observation": ["goal", "proximity"]}),
+            ("flange", {"arm": "paper_flange"}),
+        ):
+            policy_for(both.replace(**changed)).save(tmp_path / f"{name}.npz")
+        angles, near, flange = (tmp_path / f"{name}.npz" for name in ("angles", "near", "flange"))
+        said = "'angles' does not run here: policy 'angles' sees other observations"
+        check_refused(replay("--play", PLAYED[0], angles), said)
+        check_refused(replay("--play", near), "'near' does not run here: the policy sees proximity")
+        said = "'flange' does not run here: the policy was trained for arm 'paper_flange', not for"
+        check_refused(replay("--play", PLAYED[0], flange), said)

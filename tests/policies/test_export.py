@@ -11,50 +11,20 @@ from pathlib import Path
 import numpy as np
 import pytest
 from known_arms import INSTALLED
+from random_policies import policy_for, sliding
 
-from kinarm import Arm, ReachProblem, Scene, Simulator
+from kinarm import ReachProblem, Scene, Simulator
 from kinarm.clearance import random_configurations
 from kinarm.errors import ArmError, InvalidInputError, OutputError
 from kinarm.observation import OBSERVATION
 from kinarm.policies import Policy, export_policy, load_policy
 from kinarm.policies.arm_policy import ArmPolicy, self_test
 from kinarm.policies.mirror import problem_mirror
-from kinarm.policies.policy import Layer
-from kinarm.policies.provenance import Provenance
 
 N, STEPS = 14_000, 24
 """Configurations that are drawn, of which 10,000 of the paper's arm touch nothing; and steps."""
 
 EMPTY = Scene(obstacles=(), ground=False)
-
-
-def policy_for(problem, *, activation="tanh", seed=0, mirror=None):
-    """Two layers with random weights."""
-    simulator = Simulator(problem, threads=1)
-    rng, n_in, n_out = np.random.default_rng(seed), simulator.n_observations, simulator.n_actions
-    std = rng.uniform(0.5, 2, n_in)
-    std[::7] = 1e-8
-    return Policy(
-        mean=rng.normal(size=n_in),
-        std=std,
-        layers=(
-            Layer(rng.normal(size=(16, n_in)) / 4, rng.normal(size=16)),
-            Layer(rng.normal(size=(n_out, 16)) / 4, rng.normal(size=n_out) / 4),
-        ),
-        activations=(activation, "linear"),
-        provenance=Provenance(
-            algorithm="a", recipe="b", problem=problem.pinned, environment_steps=0
-        ),
-        mirror=mirror,
-    )
-
-
-def sliding(make_joint, write_robot):
-    """A lift that carries two joints, on nothing."""
-    limit = '<limit lower="-1" upper="2" velocity="{}" effort="0"/>'
-    joints = [make_joint("prismatic", xyz="0 0 0.1", limit=limit.format(0.5))]
-    joints += [make_joint(xyz="0.4 0 0", limit=limit.format(3), axis="0 1 0") for _ in range(2)]
-    return Arm.load(write_robot(joints, tool="0.3 0 -0.1"))
 
 
 def states(simulator, n=N):
