@@ -26,6 +26,9 @@ from kinarm.world import World
 WITH_MEMORY = {"joint_velocities", "last_action", "time_left"}
 """Parts of an observation that depend on more than joint positions, command and goal."""
 
+REACHED = ("rotation_tolerance", "hold", "speed")
+"""When a goal counts as reached, beside the tolerance of its position."""
+
 WIRING = ("sign", "offset")
 """Of a joint in a contract: what the arm reads is sign * position + offset."""
 
@@ -155,6 +158,7 @@ def contract_of(
     memory = layout.history > 1 or not WITH_MEMORY.isdisjoint(layout.places)
     kind, side = task.goal.kind, None if policy.mirror is None else policy.mirror.side
     meant = {"kind": kind, "is": GOALS[kind], "length": world.goal_width}
+    meant["tolerance"] = task.tolerance
     contract = {
         "made_by": f"kinarm {kinarm.__version__}",
         "policy": {
@@ -173,7 +177,7 @@ def contract_of(
         "tool": {name: array.tolist() for name, array in tool.items()},
         "time_step": dt,
         "rate": 1.0 / dt,
-        "goal": {**meant, "tolerance": task.tolerance},
+        "goal": meant | {name: getattr(task.goal, name) for name in REACHED},
         "observation": {
             "parts": parts,
             "history": layout.history,

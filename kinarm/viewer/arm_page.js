@@ -30,10 +30,7 @@ class ArmStage extends Stage {
       group.children[0].material.color.copy(this.colours[touching.has(number) ? 1 : 0]);
     });
     this.glow([...touching].filter((number) => number < this.shapes.length).map((number) => this.data.bodies[number].joint));
-    this.flash.visible = pairs.length > 0;
-    if (this.flash.visible) {
-      this.flash.position.fromArray(pairs[0][2]);
-    }
+    this.flashAt(pairs[0]?.[2]);
     this.viewer.set_dirty();
   }
 

@@ -42,7 +42,7 @@ class Search {
   /** Errors by their tolerances. */
   misses(configuration) {
     const { offset, restError } = this.errors(configuration);
-    const { tolerance, rotationTolerance } = this.simulator.task;
+    const { tolerance, rotation_tolerance: rotationTolerance } = this.simulator.task;
     return [...offset.map((value) => value / tolerance), ...restError.map((value) => (2 * value) / rotationTolerance)];
   }
 

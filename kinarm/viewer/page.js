@@ -65,8 +65,28 @@ function toggleKeys() {
 /** What buttons and keys of a page do; pages have their own `keys`. */
 class Controls {
   constructor(stage, data) {
-    this.stage = stage;
-    this.data = data;
+    Object.assign(this, { stage, data, playing: false });
+    this.calm = window.matchMedia("(prefers-reduced-motion: reduce)").matches;
+  }
+
+  setPlaying(playing) {
+    this.playing = playing;
+    document.body.classList.toggle("playing", playing);
+    element("play").setAttribute("aria-label", playing ? "Pause" : "Play");
+  }
+
+  /** Call `elapse` before every frame, with the seconds since the last one. */
+  run() {
+    let before = null;
+    const tick = (now) => {
+      this.elapse(Math.min((now - (before ?? now)) / 1000, 0.1), now);
+      before = now;
+      if (this.stage.flash.visible && !this.calm) {
+        this.stage.pulse(now / 1000);
+      }
+      requestAnimationFrame(tick);
+    };
+    requestAnimationFrame(tick);
   }
 
   setTheme(name) {

@@ -15,8 +15,7 @@ class Playground extends Controls {
     if (!(this.simulator.selfTest() < ACCURACY)) {
       throw new Error("it does not compute as kinarm does");
     }
-    this.calm = window.matchMedia("(prefers-reduced-motion: reduce)").matches;
-    Object.assign(this, { trial: 0, speed: 0.5, playing: false, turning: false });
+    Object.assign(this, { trial: 0, speed: 0.5, turning: false });
     this.simulator.servo = this.simulator.servos.find(({ hertz }) => hertz === data.plant.servo);
     Object.assign(this.simulator, { delay: data.plant.delay, shield: data.shield });
     this.fill();
@@ -24,7 +23,7 @@ class Playground extends Controls {
     this.takePointers();
     this.preferTheme();
     this.reset();
-    requestAnimationFrame((now) => this.tick(now));
+    this.run();
   }
 
   fill() {
@@ -67,12 +66,6 @@ class Playground extends Controls {
     element(id).setAttribute("aria-pressed", String(on));
   }
 
-  setPlaying(playing) {
-    this.playing = playing;
-    document.body.classList.toggle("playing", playing);
-    element("play").setAttribute("aria-label", playing ? "Pause" : "Play");
-  }
-
   /* ---------- episodes ---------- */
 
   /** Everything as in a trial. */
@@ -80,23 +73,27 @@ class Playground extends Controls {
     this.trial = trial;
     this.stage.obstacles.forEach((_, k) => this.moveObstacle(k, [0, 0, 0]));
     const { starts, goals } = this.data.trials;
-    this.state = this.simulator.begin(starts[trial], goals[trial]);
+    this.rest(starts[trial], goals[trial]);
     const side = goals[trial][1] < 0 ? -1 : 1;
     if (!this.stage.touched && side !== this.stage.side) {
       this.stage.look(side);
     }
-    this.started();
   }
 
   /** A new episode from where the arm is, at rest. */
   restart() {
-    this.state = this.simulator.begin(this.state.q, this.state.goal);
+    this.rest(this.state.q, this.state.goal);
+  }
+
+  rest(q, goal) {
+    this.state = this.simulator.begin(q, goal);
+    Object.assign(this, { before: q, share: 0 });
     this.started();
   }
 
   started() {
     const { simulator, state } = this;
-    Object.assign(this, { before: state.q, share: 0, way: [state.tool], replaced: 0, begun: state.q, solution: undefined, moved: performance.now() });
+    Object.assign(this, { way: [state.tool], replaced: 0, begun: state.q, solution: undefined, moved: performance.now() });
     const [touching] = simulator.contact.at(state.q);
     if (touching) { // an obstacle was pushed into the arm
       const pair = this.data.pairs.findIndex(([first, second]) => first === touching[0] && second === touching[1]);
@@ -108,7 +105,7 @@ class Playground extends Controls {
   /** Move the goal, as far as it may be [m, and rad or 1]; the arm goes on from there. */
   setGoal(goal) {
     const far = 1.2 * this.data.reach;
-    const at = goal.slice(0, 3).map((value, k) => clamp(value, k === 2 ? 0 : -far, far));
+    const at = goal.slice(0, 3).map((value, k) => clamp(value, k === 2 ? Math.min(this.state.goal[2], 0) : -far, far));
     this.simulator.turnTo(this.state, [...at, ...goal.slice(3)]);
     this.started();
   }
@@ -133,14 +130,15 @@ class Playground extends Controls {
     this.stage.obstacles[number].position.fromArray(offset);
   }
 
-  tick(now) {
-    const passed = Math.min((now - (this.last ?? now)) / 1000, 0.1);
-    this.last = now;
+  elapse(passed, now) {
     if (this.playing && !this.state.outcome) {
       this.share += (passed * this.speed) / this.simulator.timeStep;
       for (let steps = 0; this.share >= 1 && !this.state.outcome; steps++) {
         this.share = steps < MOST_STEPS ? this.share - 1 : 0;
         this.step();
+      }
+      if (this.state.outcome) {
+        Object.assign(this, { before: this.state.q, share: 0 });
       }
       this.show();
     }
@@ -148,10 +146,6 @@ class Playground extends Controls {
       this.solution = nearestSolution(this.simulator, { q: this.begun, goal: this.state.goal });
       this.show();
     }
-    if (this.stage.flash.visible && !this.calm) {
-      this.stage.pulse(now / 1000);
-    }
-    requestAnimationFrame((next) => this.tick(next));
   }
 
   step() {
@@ -165,8 +159,7 @@ class Playground extends Controls {
 
   show() {
     const { state, solution, simulator } = this;
-    const share = state.outcome ? 1 : this.share;
-    const between = this.before.map((value, k) => value + share * (state.q[k] - value));
+    const between = this.before.map((value, k) => value + this.share * (state.q[k] - value));
     this.stage.show(between, state, this.way, solution);
     const outcome = state.outcome ?? (state.steps >= simulator.task.horizon ? "truncated" : "moving");
     if (element("outcome").dataset.outcome !== outcome) {
@@ -187,13 +180,13 @@ class Playground extends Controls {
   }
 
   verdict(outcome) {
-    const { state, data } = this;
+    const { state, data, simulator: { task } } = this;
     const steps = count(state.steps, "step");
     const names = (found) => data.pairs[found.pair].map((body) => data.bodies[body].name);
     return {
-      success: `within ${metres(data.problem.task.tolerance)} after ${steps}`,
+      success: `within ${metres(task.tolerance)} after ${steps}`,
       collision: state.touched ? `${names(state.touched).join(" touches ")} after ${steps}` : "",
-      truncated: `not there after ${count(data.problem.task.horizon, "step")}, and goes on`,
+      truncated: `not there after ${count(task.horizon, "step")}, and goes on`,
       moving: state.replaced ? names(state.replaced).join(" would touch ") : "",
     }[outcome];
   }
@@ -276,7 +269,7 @@ start((viewer, data) => {
     solution: (start, goal) => nearestSolution(playground.simulator, { q: start, goal }),
     setGoal: (goal) => playground.setGoal(goal),
     moveObstacle: (number, offset) => { playground.moveObstacle(number, offset); playground.restart(); },
-    step: () => { playground.step(); playground.show(); },
+    step: () => { playground.step(); playground.share = 1; playground.show(); },
     onScreen: (point) => stage.onScreen(point),
     lookFrom: (eye, target) => stage.lookFrom(eye, target),
     pose: (name) => stage.pose(name),

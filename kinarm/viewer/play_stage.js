@@ -39,10 +39,7 @@ class PlayStage extends Stage {
     geometry.attributes.position.copyArray(way.slice(-MOST_TRAIL).flat()).needsUpdate = true;
     geometry.setDrawRange(0, Math.min(way.length, MOST_TRAIL));
     const { touched, replaced } = state;
-    this.flash.visible = Boolean(touched?.point);
-    if (this.flash.visible) {
-      this.flash.position.fromArray(touched.point);
-    }
+    this.flashAt(touched?.point);
     const found = touched || replaced;
     const joints = found ? this.data.pairs[found.pair].map((body) => this.data.bodies[body].joint).filter(Boolean) : [];
     this.glow(joints, touched ? TOUCHED : this.data.colours.replaced);

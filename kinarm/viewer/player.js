@@ -80,8 +80,6 @@ class Player extends Controls {
   constructor(stage, data) {
     super(stage, data);
     this.speed = 0.25;
-    this.playing = false;
-    this.calm = window.matchMedia("(prefers-reduced-motion: reduce)").matches;
     const groups = new Map();
     data.trials.forEach((trial, index) => {
       const words = BADGES[trial.runs[0].outcome][0].toLowerCase();
@@ -99,7 +97,7 @@ class Player extends Controls {
     this.takeInput();
     this.preferTheme();
     this.select(0);
-    requestAnimationFrame((now) => this.tick(now));
+    this.run();
   }
 
   get trial() {
@@ -155,10 +153,8 @@ class Player extends Controls {
   }
 
   setPlaying(playing) {
-    this.playing = playing;
+    super.setPlaying(playing);
     this.held = 0;
-    document.body.classList.toggle("playing", playing);
-    element("play").setAttribute("aria-label", playing ? "Pause" : "Play");
   }
 
   setSpeed(speed) {
@@ -166,20 +162,11 @@ class Player extends Controls {
     element("speed").value = speed;
   }
 
-  tick(now) {
-    const passed = Math.min((now - (this.before ?? now)) / 1000, 0.1);
-    this.before = now;
-    if (this.playing) {
-      this.advance(passed);
-    }
-    if (this.stage.flash.visible && !this.calm) {
-      this.stage.pulse(now / 1000);
-    }
-    requestAnimationFrame((next) => this.tick(next));
-  }
-
   /** Play on; at the end hold for a moment, then go to the next trial. */
-  advance(passed) {
+  elapse(passed) {
+    if (!this.playing) {
+      return;
+    }
     if (this.time < this.frames) {
       this.show(this.time + (passed * this.speed) / this.trial.timeStep);
       return;

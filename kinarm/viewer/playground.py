@@ -1,9 +1,7 @@
 """The playground: a page in which policies run, and whose goal and obstacles one moves."""
 
-import base64
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
-from pathlib import Path
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -12,7 +10,6 @@ from kinarm.episode_plants import EpisodePlants
 from kinarm.errors import InvalidInputError
 from kinarm.kernels.compiling import Array
 from kinarm.kernels.plant import RATE, SERVO, TRAPEZE
-from kinarm.networks import Networks
 from kinarm.plant import Plant
 from kinarm.shield import shield_table
 from kinarm.viewer.drawing import DrawnScene, draw_goal, draw_stage
@@ -27,64 +24,26 @@ SERVOS = (0.0, 20.0, 10.0, 5.0)
 SCRIPTS = ("kinematics", "contact", "simulator", "inverse", "play_stage", "play")
 
 
-@dataclass(frozen=True)
-class PagePolicy:
-    """A policy for a page.
-
-    Attributes
-    ----------
-    name : str
-        What the page calls it.
-    contract : dict
-        What `kinarm.policies.export.contract_of` says of it in the world of the page.
-    networks : Networks
-        Its network, normaliser folded in.
-    """
-
-    name: str
-    contract: dict[str, Any]
-    networks: Networks
-
-    @property
-    def data(self) -> dict[str, Any]:
-        """All of it as JSON."""
-        mirror = self.networks.mirror
-        signs = {} if mirror is None else {"observations": mirror[0], "actions": mirror[1]}
-        parameters = self.networks.parameters[0].astype("<f8").tobytes()
-        return {
-            "name": self.name,
-            "contract": self.contract,
-            "widths": self.networks.widths,
-            "parameters": base64.b64encode(parameters).decode(),
-            "signs": {name: each.tolist() for name, each in signs.items()},
-        }
-
-
-class PlayPage(HtmlPage):
-    """A page in which policies run. A notebook shows it."""
-
-
 def play_page(
     world: World,
-    policies: Sequence[PagePolicy],
+    policies: Sequence[Mapping[str, Any]],
     starts: Array,
     goals: Array,
-    path: str | Path | None = None,
     *,
     shield: bool = False,
-) -> PlayPage:
+) -> HtmlPage:
     """Make a page in which policies of one arm run.
 
     Parameters
     ----------
     world : World
         Where: bodies and goals stand, and steps are tested for contact throughout.
-    policies : sequence of PagePolicy
-        Policies to choose from; the first one runs at first.
+    policies : sequence of dict
+        Policies to choose from, in the words of
+        `kinarm.evaluation.replay.playground.page_policy`; the first one runs
+        at first.
     starts, goals : ndarray, shape (n, n_joints) and (n, goal_width)
         Starts [rad or m] and goals of the trials that the page offers.
-    path : str or Path, optional
-        File of the page, if it is to be written.
     shield : bool
         Whether the shield is on at first.
 
@@ -100,19 +59,17 @@ def play_page(
     data = {
         **arm_data(arm, scene),
         **contact_data(world.contact_model),
-        "problem": {"name": problem.name, **_problem_data(world, starts[:1], goals[:1])},
+        "servos": _servos(world, starts[:1], goals[:1]),
+        "shares": shield_table(arm.n_actuated),
         "obstacles": arm.geometry.ngeoms + np.arange(len(scene.obstacles)),
         "reach": arm.reach,
-        "policies": [policy.data for policy in policies],
+        "policies": policies,
         "trials": {"starts": starts, "goals": goals},
         "shield": shield,
         "plant": {"servo": problem.plant.bandwidth, "delay": problem.plant.delay},
         "colours": {name: f"#{colour:06x}" for name, colour in PAGE_COLOURS.items()},
     }
-    page = PlayPage(page_html("play", f"{arm.name} · kinarm", drawn.content, data, SCRIPTS))
-    if path is not None:
-        page.save(path)
-    return page
+    return HtmlPage(page_html("play", f"{arm.name} · kinarm", drawn.content, data, SCRIPTS))
 
 
 def _check_playable(world: World) -> None:
@@ -134,36 +91,13 @@ def _check_playable(world: World) -> None:
             raise InvalidInputError(f"no page plays problem {problem.name!r}: it has {reason}")
 
 
-def _problem_data(world: World, start: Array, goal: Array) -> dict[str, Any]:
-    """What a simulator in a page has to know beside arm and contact."""
-    problem, rules, n = world.problem, world.rules, world.arm.n_actuated
-    task, plant = problem.task, problem.plant
-    servos = []
+def _servos(world: World, start: Array, goal: Array) -> list[dict[str, Any]]:
+    """What a simulator in a page has to know of the servos that one chooses from."""
+    plant, servos = world.problem.plant, []
     for hertz in sorted({*SERVOS, float(plant.bandwidth)}):  # type: ignore[arg-type]
         # A delay, so that joints without servos have numbers, too.
-        lagging = problem.replace(plant=replace(plant, bandwidth=hertz, delay=1))
-        (numbers,) = EpisodePlants(lagging, rules.step_limit).of(start, goal, 1)
+        lagging = world.problem.replace(plant=replace(plant, bandwidth=hertz, delay=1))
+        (numbers,) = EpisodePlants(lagging, world.rules.step_limit).of(start, goal, 1)
         matrix, trapeze, rate = numbers[SERVO : SERVO + 4], numbers[TRAPEZE], numbers[RATE]
         servos.append({"hertz": hertz, "matrix": matrix, "trapeze": trapeze, "rate": rate})
-    return {
-        "lower": world.arm.lower[:n],
-        "upper": world.arm.upper[:n],
-        "step": rules.step_limit,
-        "timeStep": problem.stepping.time_step,
-        "feedback": plant.feedback,
-        "tool": {
-            "position": world.arm.chain.tool,
-            "rotation": rules.goal.frame,
-            "axis": rules.goal.axis,
-        },
-        "task": {
-            "kind": task.goal.kind,
-            "tolerance": task.tolerance,
-            "rotationTolerance": task.goal.rotation_tolerance,
-            "stride": rules.goal.stride if np.isfinite(rules.goal.stride) else None,
-            "hold": task.goal.hold,
-            "horizon": task.horizon,
-        },
-        "servos": servos,
-        "shares": shield_table(n),
-    }
+    return servos

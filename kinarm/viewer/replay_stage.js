@@ -81,23 +81,13 @@ class ReplayStage extends Stage {
     const cube = this.mesh("goal", "cube").material;
     cube.emissive.set(ended && run.outcome === "success" ? 0x0b6b50 : 0x000000);
     const touched = ended && run.outcome === "collision";
-    this.flash.visible = touched && run.contactPoint !== null;
     this.refused.root.visible = touched && run.refused !== null;
-    if (this.flash.visible) {
-      this.flash.position.fromArray(run.contactPoint);
-    }
+    this.flashAt(touched ? run.contactPoint : null);
     if (this.refused.root.visible) {
       this.refused.show(run.refused);
     }
     const joints = touched ? (run.contact || []).map((body) => this.data.links[body]) : [];
     this.glow(joints);
-  }
-
-  pulse(seconds) {
-    const swing = 0.5 - 0.5 * Math.cos(2 * Math.PI * 1.1 * seconds);
-    this.flash.scale.setScalar(1 + 1.1 * swing);
-    this.mesh("flash").material.opacity = 0.75 - 0.45 * swing;
-    this.viewer.set_dirty();
   }
 
   /** Pose of a part of the arm, or of its rival; see `Stage.pose`. */

@@ -65,11 +65,16 @@ const ERRORS = {
 
 class Simulator {
   constructor(data) {
-    Object.assign(this, data.problem); // limits, step, task, servos, shares
     this.contact = new ContactTest(data);
     this.kinematics = this.contact.kinematics;
     this.policies = data.policies.map((each) => new Policy(each));
-    Object.assign(this, { policy: this.policies[0], servo: this.servos[0], delay: 0, shield: false });
+    // Contracts differ in the policy alone.
+    const { joints, tool, goal, time_step: timeStep, plant, observation } = this.policies[0].contract;
+    const actuated = joints.filter((joint) => joint.actuated);
+    const [lower, upper, limits] = ["lower", "upper", "velocity_limit"].map((name) => actuated.map((joint) => joint[name]));
+    Object.assign(this, { tool, timeStep, lower, upper, step: limits.map((limit) => limit * timeStep), feedback: plant.feedback });
+    this.task = { ...goal, horizon: observation.horizon, stride: goal.speed === null ? Infinity : goal.speed * timeStep };
+    Object.assign(this, { servos: data.servos, shares: data.shares, policy: this.policies[0], servo: data.servos[0], delay: 0, shield: false });
   }
 
   get lags() {
@@ -112,7 +117,7 @@ class Simulator {
   }
 
   within({ distance, turn }) {
-    return distance <= this.task.tolerance && turn <= this.task.rotationTolerance;
+    return distance <= this.task.tolerance && turn <= this.task.rotation_tolerance;
   }
 
   measure(state) {
@@ -238,7 +243,7 @@ class Simulator {
     const [before, tool] = [this.seen(state), state.tool];
     Object.assign(state, next, { before, action, replaced });
     this.measure(state);
-    const slow = Math.hypot(...minus(state.tool, tool)) <= (this.task.stride ?? Infinity);
+    const slow = Math.hypot(...minus(state.tool, tool)) <= this.task.stride;
     state.held = this.within(state) && slow ? state.held + 1 : 0;
     state.rows = [this.observe(state), ...state.rows.slice(0, -1)];
     state.outcome = state.held >= this.task.hold ? "success" : null;

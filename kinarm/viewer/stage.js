@@ -133,6 +133,21 @@ class Stage {
     });
   }
 
+  /** Show a ball at a contact, or none. */
+  flashAt(point) {
+    this.flash.visible = Boolean(point);
+    if (point) {
+      this.flash.position.fromArray(point);
+    }
+  }
+
+  pulse(seconds) {
+    const swing = 0.5 - 0.5 * Math.cos(2 * Math.PI * 1.1 * seconds);
+    this.flash.scale.setScalar(1 + 1.1 * swing);
+    this.mesh("flash").material.opacity = 0.75 - 0.45 * swing;
+    this.viewer.set_dirty();
+  }
+
   colour(value) {
     return new this.THREE.Color(value).convertSRGBToLinear();
   }

@@ -11,30 +11,41 @@ from random_policies import policy_for, sliding
 from kinarm import Observation, Scene, Simulator
 from kinarm.evaluation import ReplayRequest, TrialSet
 from kinarm.evaluation.bounds import oracle_bounds
-from kinarm.evaluation.replay.playground import PLAYED
+from kinarm.evaluation.replay.playground import PLAYED, page_policy
 from kinarm.goals import REST_PARTS, GoalSpecification
 from kinarm.observation import OBSERVATION
 from kinarm.plant import Plant
 from kinarm.policies import load_policy
-from kinarm.policies.export import contract_of
 from kinarm.policies.mirror import problem_mirror
 from kinarm.problem import ReachProblem
-from kinarm.viewer.playground import PagePolicy, play_page
+from kinarm.viewer.playground import play_page
 
 ROLLOUT = "(r) => kinarm.rollout(r).map((end) => [end.joints, end.steps, end.outcome])"
 PATHS = "(r) => kinarm.rollout(r).map((end) => end.path)"
 SOLUTIONS = "([starts, goals]) => starts.map((q, n) => kinarm.solution(q, goals[n]))"
+DRAGGED = """async () => {
+    for (let frame = 0; frame < 30; frame++) {
+        const [x, ...rest] = kinarm.state.goal;
+        kinarm.setGoal([x + 0.001, ...rest]);
+        await new Promise(requestAnimationFrame);
+    }
+}"""
 LOOK = "[[-2.35, 1.85, 1.5], [0, 0, 0.3]]"
 OTHERS = {"proximity", "obstacles", *chain(*REST_PARTS.values())}
 SEEN = [part.name for part in OBSERVATION if part.name not in OTHERS]
 
 
 @pytest.fixture(scope="module")
-def page(visit, tmp_path_factory):
+def play_file(tmp_path_factory):
     """The page without any option."""
     out = tmp_path_factory.mktemp("play") / "play.html"
     ReplayRequest(play=(), out=out).run()
-    with visit(out, (1280, 800)) as opened:
+    return out
+
+
+@pytest.fixture(scope="module")
+def page(visit, play_file):
+    with visit(play_file, (1280, 800)) as opened:
         yield opened
 
 
@@ -68,9 +79,9 @@ def check_episodes(page, simulator, policy, starts, goals, settings=None):
 
 def page_of(simulator, policy, visit, folder):
     world = simulator.world
-    player = PagePolicy("random", contract_of(policy, world), policy.networks())
+    player = page_policy("random", policy, world)
     starts, goals = simulator.sample(np.random.default_rng(0), 40)
-    play_page(world, [player], starts, goals, folder / "play.html")
+    play_page(world, [player], starts, goals).save(folder / "play.html")
     return visit(folder / "play.html"), starts, goals
 
 
@@ -197,6 +208,27 @@ def test_the_cube_is_dragged(watched):
     assert after["steps"] == 0
 
 
+def test_the_cube_is_dragged_by_touch(watched):
+    """The view stays; a touch of nothing turns it."""
+    x, y = at_goal(watched)
+    session = watched.page.context.new_cdp_session(watched.page)
+
+    def drag(*points):
+        kinds = ("touchStart", *["touchMove"] * (len(points) - 1))
+        for kind, (across, down) in zip(kinds, points, strict=True):
+            touch = {"type": kind, "touchPoints": [{"x": across, "y": down}]}
+            session.send("Input.dispatchTouchEvent", touch)
+        session.send("Input.dispatchTouchEvent", {"type": "touchEnd", "touchPoints": []})
+
+    eye = watched.tell("kinarm.onScreen([0, 0, 0])")
+    drag((x, y), (x - 30, y - 20), (x - 60, y - 40))
+    found = watched.tell("kinarm.onScreen(kinarm.state.goal)")
+    np.testing.assert_allclose(found, [x - 60, y - 40], atol=0.5)
+    assert watched.tell("kinarm.onScreen([0, 0, 0])") == eye
+    drag((1000, 150), (1040, 170), (1080, 200))
+    assert watched.tell("kinarm.onScreen([0, 0, 0])") != eye
+
+
 def test_an_obstacle_is_dragged_along_the_floor_and_touches(watched):
     """The verdict names what kinarm's world finds to touch."""
     at_goal(watched)
@@ -262,6 +294,20 @@ def test_the_policy_plays_until_it_is_there(watched):
     goal = watched.state["goal"]
     watched.tell(f"kinarm.setGoal({[*goal[:2], goal[2] + 0.2]})")
     assert (watched.state["steps"], watched.state["outcome"]) == (0, None)
+
+
+def test_it_plays_and_a_contact_pulses(visit, play_file):
+    with visit(play_file, calm=False) as opened:
+        opened.page.wait_for_selector("#outcome[data-outcome=success]")
+        again = "document.getElementById('reset').click()"
+        opened.tell(f"{again}; kinarm.moveObstacle(1, [0, -0.15, 0.4])")
+        opened.page.wait_for_timeout(200)
+        assert opened.state["outcome"] == "collision"
+        opened.page.keyboard.press("n")
+        before = opened.state["q"]
+        opened.tell(DRAGGED)
+        assert opened.state["q"] != before, "the arm follows while the cube is dragged"
+        assert opened.complaints == []
 
 
 def test_lag_delay_and_policy_are_chosen(watched):
