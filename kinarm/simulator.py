@@ -198,7 +198,7 @@ class Simulator(EpisodeRunner):
             ``networks()`` run compiled; a function from observations (n,
             n_observations) to actions (n, n_actions) is called once a step for
             the running episodes; if it takes ``rows``, it gets their numbers.
-            One with the attribute ``shield`` acts behind a shield.
+            Those with the attribute ``shield`` act behind a shield: all or none.
         starts, goals, record
             As for `reset`.
         policy_index : array_like of int, shape (n,), optional
@@ -206,7 +206,14 @@ class Simulator(EpisodeRunner):
         shift : ndarray, shape (n_observations,), optional
             Collect moments of the observations about it.
         """
-        if getattr(policies, "shield", False) and not self.problem.stepping.shield:
+        several = policies if isinstance(policies, Sequence) else (policies,)
+        n_shielded = sum(getattr(each, "shield", False) for each in several)
+        if n_shielded and not self.problem.stepping.shield:
+            if n_shielded < len(several):
+                raise InvalidInputError(
+                    "policies of one rollout must all act behind a shield or none, got "
+                    f"{n_shielded} of {len(several)}"
+                )
             return self.shielded().rollout(
                 policies, starts, goals, policy_index=policy_index, record=record, shift=shift
             )
