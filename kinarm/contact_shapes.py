@@ -23,6 +23,7 @@ from kinarm.enclosures import (
     prism,
 )
 from kinarm.kernels.compiling import Array
+from kinarm.kernels.lanes import LANES
 from kinarm.scene import Scene
 
 BETWEEN_CAPSULES, WITH_BOX, WITH_HALFSPACE = range(3)
@@ -58,10 +59,13 @@ class ContactShapes(NamedTuple):
         other [m/rad, or m/m].
     exact : ndarray of bool, shape (n_shapes,)
         Whether a shape equals its capsule, box or half-space.
-    bodies : ndarray of int, shape (n_bodies, 3)
-        First corner, the one after the last, and frame.
+    bodies : ndarray of int, shape (n_bodies, 5)
+        First corner, the one after the last, and frame; and first block, and the
+        one after the last.
     corners : ndarray, shape (n_corners, 3)
         Corners in that frame [m].
+    blocks : ndarray, shape (n_blocks, 4, LANES)
+        The corners of each body once more, x, y, z and row; the last one repeats.
     rounding : ndarray, shape (n_bodies,)
         Radius that widens the hull of the corners [m]; for the scene's bodies,
         it is in their rows.
@@ -91,6 +95,7 @@ class ContactShapes(NamedTuple):
     exact: NDArray[np.bool_]
     bodies: NDArray[np.int64]
     corners: Array
+    blocks: Array
     rounding: Array
     excess: Array
     extents: Array
@@ -126,6 +131,8 @@ class ContactShapes(NamedTuple):
         surroundings = [unit_body(body) for body in scene.bodies]
         bodies, links, (closer, finer) = _enclosed(objects, surroundings, arm.n_joints)
         ends = np.cumsum([0, *(len(body.corners) for body in bodies)])
+        blocks = list(map(corner_blocks, bodies, ends))
+        edges, frames = np.cumsum([0, *map(len, blocks)]), np.array(links, dtype=np.int64)
         rows, planes, proxies = [], [], []
         travel = np.zeros((arm.n_actuated, len(pairs)))
         for column, (first, second) in enumerate(pairs):
@@ -157,8 +164,9 @@ class ContactShapes(NamedTuple):
             pairs=np.array(rows, dtype=np.int64).reshape(-1, 3),
             travel=travel,
             exact=np.array(exact, dtype=bool),
-            bodies=np.stack([ends[:-1], ends[1:], np.array(links, dtype=np.int64)], axis=1),
+            bodies=np.stack([ends[:-1], ends[1:], frames, edges[:-1], edges[1:]], axis=1),
             corners=np.concatenate([body.corners for body in bodies] or [np.zeros((0, 3))]),
+            blocks=np.concatenate([*blocks, np.zeros((0, 4, LANES))]),
             rounding=np.array([body.rounding for body in bodies], dtype=np.float64),
             excess=np.array([body.excess for body in bodies], dtype=np.float64),
             extents=np.array(
@@ -170,6 +178,14 @@ class ContactShapes(NamedTuple):
             placed=np.array(list(map(placed_row, scene.bodies, surroundings))).reshape(-1, 16),
             moving=np.array(scene.moving, dtype=np.int64),
         )
+
+
+def corner_blocks(body: Enclosure, first: int) -> Array:
+    """A body's corners for `ContactShapes.blocks`, from the row of the first."""
+    n = len(body.corners)
+    within = np.minimum(np.arange(n + -n % LANES), n - 1)
+    rows = np.column_stack([body.corners[within], first + within])
+    return rows.reshape(-1, LANES, 4).transpose(0, 2, 1)
 
 
 AXIS = (0.0, 0.0, -1.0, 0.0, 0.0, 1.0)

@@ -173,12 +173,9 @@ class Episodes(NamedTuple):
         Subtracted before summing, for accuracy.
     path : ndarray, shape (n, horizon + 1, n_joints) or (0, 0, n_joints)
         Configurations visited.
-    attempt, tried, blocker : ndarray, shape (n,)
-        Replacements tried of the step under way, distance of the last one from
-        it, and number, from 1, of the pair that it would have touched.
-    projected : ndarray, shape (n, n_actuated + 2)
-        Its projection off what it touches, how far that is, and how often it was
-        projected.
+    shielding, blocker : ndarray of int, shape (n,)
+        How a shield treats the step under way (``kinarm.kernels.shield``), 0 if
+        it does not; and number, from 1, of the pair that it would have touched.
     interventions, replaced : ndarray of int, shape (n,), and (n, horizon), or of no rows
         Steps that a shield replaced, and the pairs that these would have
         touched, from 1; -1 if that is not known, and 0 for other steps.
@@ -206,10 +203,8 @@ class Episodes(NamedTuple):
     moments: Array
     shift: Array
     path: Array
-    attempt: NDArray[np.int64]
-    tried: Array
+    shielding: NDArray[np.int64]
     blocker: NDArray[np.int64]
-    projected: Array
     interventions: NDArray[np.int64]
     replaced: NDArray[np.int64]
 

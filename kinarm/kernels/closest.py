@@ -14,7 +14,6 @@ from kinarm.chain import Chain
 from kinarm.kernels.compiling import Array, Vector, helper, inlined, kernel
 from kinarm.kernels.distance import of_segment, of_triangle, shrink
 from kinarm.kernels.kinematics import POSE, forward_kinematics, rotated_back, to_world
-from kinarm.kernels.planes import lowest_corner
 
 CORNERS_TRIED = 64
 """Corners at which a distance is taken as it is."""
@@ -64,7 +63,12 @@ class Bodies(NamedTuple):
 def lowest_in_world(bodies: Bodies, body: int, poses: Array, x: float, y: float, z: float) -> int:
     """Row of a body's corner that is lowest along a vector of the world."""
     x, y, z = rotated_back(poses, bodies.link[body], x, y, z)
-    return lowest_corner(bodies.corners, bodies.span, body, x, y, z)
+    corners, found, least = bodies.corners, bodies.span[body, 0], math.inf
+    for i in range(found, bodies.span[body, 1]):
+        height = x * corners[i, 0] + y * corners[i, 1] + z * corners[i, 2]
+        if height < least:
+            found, least = i, height
+    return found
 
 
 @inlined

@@ -34,6 +34,30 @@ def take_rows(held: Array, lane: int, rows: Array) -> None:
 
 
 @inlined
+def copy_rows(held: Array, others: Array) -> None:
+    """Copy rows into those of another array."""
+    for row in range(others.shape[0]):
+        for i in range(others.shape[1]):
+            others[row, i] = held[row, i]
+
+
+@inlined
+def spread(held: Array, lane: int, others: Array) -> None:
+    """Copy a lane of rows of lanes into all lanes of others."""
+    for row in range(others.shape[0]):
+        for i in range(others.shape[1]):
+            others[row, i] = as_numbers(held)[row, i, lane]
+
+
+@inlined
+def move_lane(held: Array, place: int, others: Array, lane: int) -> None:
+    """Copy a lane of rows of lanes into a lane of others."""
+    for row in range(others.shape[0]):
+        for i in range(others.shape[1]):
+            as_numbers(others)[row, i, lane] = as_numbers(held)[row, i, place]
+
+
+@inlined
 def put_scene(scenes: Array, e: int, lane: int, poses: Array) -> None:
     """Put the rows of an episode's bodies, if it has its own, into a lane of poses."""
     if scenes.shape[0] > 0:

@@ -211,6 +211,18 @@ def any_lane(_: Any, condition: types.Type) -> Any:
 
 
 @instruction
+def least_lane(_: Any, values: types.Type) -> Any:
+    """Least number in lanes."""
+
+    def code(_context: Any, builder: Any, _signature: Any, arguments: Any) -> Any:
+        form = ir.FunctionType(ir.DoubleType(), [NUMBERS])
+        name = f"llvm.vector.reduce.fmin.v{LANES}f64"
+        return builder.call(builder.module.declare_intrinsic(name, (), form), arguments)
+
+    return types.float64(values), code
+
+
+@instruction
 def lane_bits(_: Any, condition: types.Type) -> Any:
     """Truth values of a mask as bits of a whole number."""
 

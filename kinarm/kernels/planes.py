@@ -16,14 +16,11 @@ carrier, in a simplex of at most four differences of corners, renewed by the low
 
 import math
 
-import numpy as np
-from numpy.typing import NDArray
-
 from kinarm.contact_shapes import BETWEEN_CAPSULES, WITH_HALFSPACE, ContactShapes
 from kinarm.kernels.compiling import Array, Vector, helper, inlined
 from kinarm.kernels.distance import between_segments, depth_in, shrink
 from kinarm.kernels.kinematics import rotated, rotated_back, to_frame, to_world
-from kinarm.kernels.lanes import select
+from kinarm.kernels.lanes import as_lanes, least_lane, select
 
 EVERYDAY, FINE = 0, 1
 """Levels of `ContactShapes.proxies`."""
@@ -168,19 +165,16 @@ def from_box(a: Vector, b: Vector, lower: Vector, upper: Vector) -> Vector:
 
 
 @inlined
-def lowest_corner(
-    corners: Array, spans: NDArray[np.int64], body: int, x: float, y: float, z: float
-) -> int:
-    """Row of a body's corner that is lowest along a vector of its joint frame.
-
-    ``spans`` begins with each body's first row and the one after its last.
-    """
-    found, least = spans[body, 0], math.inf
-    for i in range(spans[body, 0], spans[body, 1]):
-        height = x * corners[i, 0] + y * corners[i, 1] + z * corners[i, 2]
-        if height < least:
-            found, least = i, height
-    return found
+def lowest_corner(shapes: ContactShapes, body: int, x: float, y: float, z: float) -> int:
+    """Row of a body's corner that is lowest along a vector of its joint frame."""
+    blocks, first, last = as_lanes(shapes.blocks), shapes.bodies[body, 3], shapes.bodies[body, 4]
+    least = x * blocks[first, 0] + y * blocks[first, 1] + z * blocks[first, 2]
+    found = blocks[first, 3]
+    for i in range(first + 1, last):
+        height = x * blocks[i, 0] + y * blocks[i, 1] + z * blocks[i, 2]
+        found = select(height < least, blocks[i, 3], found)
+        least = min(height, least)
+    return int(least_lane(select(least <= least_lane(least), found, shapes.bodies[body, 1] - 1.0)))
 
 
 @helper
@@ -226,8 +220,8 @@ def separate(
     for _ in range(CORNERS_TRIED):
         # The mover's lowest corner, and the carrier's highest.
         x, y, z = rotated_back(relative, 0, nx, ny, nz)
-        low = lowest_corner(shapes.corners, shapes.bodies, mover, x, y, z)
-        high = lowest_corner(shapes.corners, shapes.bodies, carrier, -sx * nx, -sy * ny, -sz * nz)
+        low = lowest_corner(shapes, mover, x, y, z)
+        high = lowest_corner(shapes, carrier, -sx * nx, -sy * ny, -sz * nz)
         hx, hy, hz = sx * corners[high, 0], sy * corners[high, 1], sz * corners[high, 2]
         x, y, z = corners[low, 0], corners[low, 1], corners[low, 2]
         wx = relative[0, 13] + relative[0, 4] * x + relative[0, 5] * y + relative[0, 6] * z

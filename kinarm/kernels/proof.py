@@ -139,12 +139,14 @@ def prove_alone(
     poses: Array,
     block: Block,
     alone: Alone,
+    quick: bool = False,
 ) -> int:
     """Prove what `prove_step` has not of an episode's step, and better its planes.
 
     Poses are ``before`` the step and at the target. Returns a number whose bit k - 1 is set if
     configuration, or interval, k is not proven free. Of a step that is tested throughout, it is
-    minus the number, from 1, of a pair that touches at its end.
+    minus the number, from 1, of a pair that touches at its end. If it shall be ``quick``, it is
+    that of any pair in doubt, and suspected pairs are looked at first.
     """
     plane, planes = alone.plane, as_numbers(block.planes)
     heights, bends = as_numbers(block.height), as_numbers(block.bend)
@@ -155,8 +157,11 @@ def prove_alone(
         for i in range(3):
             alone.moved[k, i] = as_numbers(before)[frame, 13 + i, lane]
             alone.moved[k, 3 + i] = as_numbers(poses)[frame, 13 + i, lane]
-    at_start, n_open, all_open = False, 0, 0
-    for pair in range(shapes.planes.shape[0]):
+    at_start, n_open, all_open, n_pairs = False, 0, 0, shapes.planes.shape[0]
+    for index in range(-n_pairs if quick else 0, n_pairs):
+        pair = index + n_pairs if index < 0 else index
+        if quick and alone.suspected[pair] == (index >= 0):
+            continue
         if is_apart(as_numbers(block.bound)[pair, lane]):
             continue
         if tested == 0 and overlap(shapes, pair, alone.after) > -SURE_CONTACT:
@@ -177,6 +182,8 @@ def prove_alone(
             unproven = open_parts(first, last, bend, tested)
             heights[pair, lane] = first
             put(plane, 0, block.planes, pair, lane)
+        if quick and tested > 0 and unproven >> (tested - 1) & 1:
+            return -1 - pair
         alone.listed[n_open, 0], alone.listed[n_open, 1] = pair, unproven
         n_open += 0 if unproven == 0 else 1
         all_open |= unproven
@@ -187,21 +194,22 @@ def prove_alone(
         bit = 1 << (k - 1)
         if all_open & bit == 0:
             continue
-        free = is_part_free(k, parts, bit, n_open, tested, lane, chain, shapes, block, alone)
-        if not free and tested == 0 and doubt == 0:
+        given = bit, n_open, tested, lane, chain, shapes, block, alone
+        refused = refusing_pair(k, parts, *given)
+        if refused >= 0 and tested == 0 and doubt == 0:
             # The first interval in doubt is worth a closer look.
-            free, finer = True, INTERVALS * parts
+            refused, finer = -1, INTERVALS * parts
             for j in range(INTERVALS * (k - 1) + 1, INTERVALS * k + 1):
-                if free:
-                    free = is_part_free(
-                        j, finer, bit, n_open, tested, lane, chain, shapes, block, alone
-                    )
-        doubt |= 0 if free else bit
+                if refused < 0:
+                    refused = refusing_pair(j, finer, *given)
+        if quick and refused >= 0:
+            return -1 - refused
+        doubt |= 0 if refused < 0 else bit
     return doubt
 
 
 @helper
-def is_part_free(
+def refusing_pair(
     k: int,
     parts: int,
     bit: int,
@@ -212,11 +220,8 @@ def is_part_free(
     shapes: ContactShapes,
     block: Block,
     alone: Alone,
-) -> bool:
-    """Whether configuration k of so many parts, or the interval to it, is proven free.
-
-    Looks at the listed pairs with this bit, up to the first that is not.
-    """
+) -> int:
+    """First listed pair with a bit that is not proven free at configuration k, or to it, or -1."""
     bends = as_numbers(block.bend)
     if tested == 0:
         place_between(k - 1, parts, lane, chain, shapes, block, alone, alone.after)
@@ -226,8 +231,8 @@ def is_part_free(
         if alone.listed[index, 1] & bit != 0:
             bend = bends[pair, lane] / (parts * parts) if tested == 0 else -1.0
             if verdict_of(pair, lane, bend, shapes, block, alone) < 1:
-                return False
-    return True
+                return int(pair)
+    return -1
 
 
 @inlined

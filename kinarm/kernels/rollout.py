@@ -12,7 +12,7 @@ from kinarm.kernels.arriving import arrive, measure, put_goal
 from kinarm.kernels.block_proof import doubtful_steps
 from kinarm.kernels.compiling import Array, inlined, lean_kernel
 from kinarm.kernels.kinematics import forward_kinematics
-from kinarm.kernels.lane_copies import move_bodies, put, put_scene, take, take_rows
+from kinarm.kernels.lane_copies import copy_rows, move_bodies, put, put_scene, take, take_rows
 from kinarm.kernels.lanes import LANES, any_lane, as_numbers, lane_bits, select
 from kinarm.kernels.network import choose_actions, shared_policy
 from kinarm.kernels.planes import GAP
@@ -20,14 +20,7 @@ from kinarm.kernels.plant import COMMAND, move_joints, rest, sense
 from kinarm.kernels.proof import prove_configurations
 from kinarm.kernels.reward import ROTATION, add_reward, observe, remember
 from kinarm.kernels.session import Session, load_episode, store_episode, take_number
-from kinarm.kernels.shield import (
-    fails_again,
-    held_at_rest,
-    is_stuck,
-    replace_step,
-    take_down,
-    unsafe_stops,
-)
+from kinarm.kernels.shield import REFUSED, replace_step, take_down, unsafe_stops
 
 
 @lean_kernel
@@ -82,7 +75,7 @@ def begin(counters: NDArray[np.int64], session: Session, rows: NDArray[np.int64]
             episodes.status[e] = RUNNING if free >> lane & 1 else PAUSED
             n_paused += 0 if free >> lane & 1 else 1
             episodes.total[e] = 0.0
-            episodes.attempt[e] = 0
+            episodes.shielding[e] = 0
             if episodes.interventions.shape[0] > 0:
                 episodes.interventions[e] = 0
             episodes.cleared[e] = False
@@ -114,26 +107,19 @@ def advance(counters: NDArray[np.int64], session: Session) -> int:
     """
     chain, shapes, rules = session.chain, session.shapes, session.rules
     control, episodes = session.control, session.episodes
-    block, alone = session.block, session.alone
-    lower, upper, row = chain.lower, chain.upper, block.row
-    again, shielded = block.again, rules.shield.shape[0] > 0
-    looks = block.holds.shape[0] > 0
-    n_joints, n_actuated = episodes.q.shape[1], rules.step_limit.shape[0]
+    block, row, lower, upper = session.block, session.block.row, chain.lower, chain.upper
+    shielded, looks = rules.shield.shape[0] > 0, block.holds.shape[0] > 0
+    n_actuated = rules.step_limit.shape[0]
     n_episodes, n_pairs = episodes.status.shape[0], shapes.planes.shape[0]
     shared, summed = shared_policy(n_episodes, control), block.moments.shape[1]
     before, poses = block.before, block.after
     for lane in range(LANES):
-        row[lane] = again[lane] = -1
+        row[lane] = -1
     waiting, n_alive, n_paused, changed = 0, 0, 0, True
     while True:
         # Fill the lanes that are empty.
         for lane in range(row.shape[0]):
-            if row[lane] < 0 and again[lane] >= 0:
-                row[lane], again[lane] = again[lane], -1
-                load_episode(row[lane], lane, shapes, rules, control, episodes, block)
-                n_alive += 1
-                changed = True
-            elif row[lane] < 0 and waiting < n_episodes:
+            if row[lane] < 0 and waiting < n_episodes:
                 waiting = next_waiting(counters, episodes)
                 if waiting < n_episodes:
                     row[lane] = waiting
@@ -144,21 +130,14 @@ def advance(counters: NDArray[np.int64], session: Session) -> int:
             return n_paused
         # Act, unless Coal has found the step under way free.
         choose_actions(control, shared, row, block)
-        if any_lane(block.attempt[0] > 0.0):
-            for lane in range(row.shape[0]):
-                if row[lane] >= 0 and episodes.attempt[row[lane]] > 0:
-                    given = rules, episodes, block, alone
-                    replace_step(lane, row[lane], chain, shapes, *given)
         fresh = (block.alive[0] > 0.0) & ~(block.cleared[0] > 0.0)
-        wanted = fresh & ~(block.attempt[0] > 0.0)
+        wanted = fresh & ~(block.shielding[0] > 0.0)
         for i in range(summed):
             centred = select(wanted, block.observation[0, i] - episodes.shift[i], 0.0)
             block.moments[0, i] += centred
             block.moments[1, i] += centred * centred
         if looks:
-            for k in range(block.former_drive.shape[0]):
-                for axis in range(n_actuated):
-                    block.former_drive[k, axis] = block.drive[k, axis]
+            copy_rows(block.drive, block.former_drive)
         if block.plant.shape[0] > 0:
             move_joints(chain, rules, fresh, block)
         else:
@@ -174,22 +153,24 @@ def advance(counters: NDArray[np.int64], session: Session) -> int:
                 if row[lane] >= 0:
                     step = int(as_numbers(block.steps)[0, lane]) + 1
                     move_bodies(row[lane], step, lane, shapes, rules, episodes.scenes, poses)
-        asked = row, before, poses, chain, shapes, rules, episodes
-        doubtful = doubtful_steps(fresh, changed, *asked, block, alone)
+        given = row, before, poses, session, block
+        doubtful = doubtful_steps(fresh, changed, -1, False, *given)
         if looks:
             # What follows from a step while its command is held has to be free, too.
-            onward = lane_bits(fresh & ~(block.holds[0] > 0.0)) & ~doubtful
-            more = poses, chain, shapes, rules, episodes, block, session.ahead, alone
-            doubtful |= unsafe_stops(onward, row, *more)
-            if shapes.moving.shape[0] == 0:
-                # Where the arm rests, it is known to be free.
-                doubtful &= ~held_at_rest(block)
+            onward = lane_bits(fresh) & ~doubtful
+            doubtful |= unsafe_stops(onward, -1, row, poses, session, block)
+        if shielded:
+            doubtful |= lane_bits(fresh & (block.shielding[0] > 0.0))
         if doubtful != 0:
             for lane in range(row.shape[0]):
                 if doubtful >> lane & 1 == 0:
                     continue
+                e = row[lane]
+                sure = looks or episodes.touched[e] > 0 or episodes.shielding[e] > 0
+                if shielded and sure and replace_step(lane, e, before, poses, session):
+                    continue
                 # The episode leaves the block, at its end or to wait for Coal.
-                e, row[lane] = row[lane], -1
+                row[lane] = -1
                 store_episode(lane, e, episodes, block)
                 for pair in range(n_pairs):
                     # It has not moved yet.
@@ -198,13 +179,7 @@ def advance(counters: NDArray[np.int64], session: Session) -> int:
                 pair = episodes.touched[e]
                 if rules.tested == 0:
                     episodes.touched[e] = 0
-                sure = looks or pair > 0 or episodes.attempt[e] > 0
-                if shielded and sure and not is_stuck(e, episodes):
-                    fails_again(e, pair, episodes)
-                    if looks:
-                        take_rows(block.former_drive, lane, episodes.drive[e])
-                    again[lane] = e
-                elif pair > 0:
+                if pair > 0:
                     refuse_step(e, rules, episodes)
                 else:
                     episodes.status[e] = PAUSED
@@ -216,13 +191,12 @@ def advance(counters: NDArray[np.int64], session: Session) -> int:
         block.cleared[0] = 0.0
         nearer = block.distance[0]
         block.steps[0] += 1.0
-        if any_lane(block.attempt[0] > 0.0):
+        if any_lane(block.shielding[0] > 0.0):
             for lane in range(row.shape[0]):
-                if row[lane] >= 0 and episodes.attempt[row[lane]] > 0:
+                if row[lane] >= 0 and episodes.shielding[row[lane]] > 0:
                     take_down(lane, row[lane], episodes, block)
         remember(block)
-        for joint in range(n_joints):
-            block.q[0, joint] = block.target[0, joint]
+        copy_rows(block.target, block.q)
         if block.turn.shape[0] > 0:
             reached = arrive(chain, rules, poses, row, episodes, block)
         if block.plant.shape[0] > 0:
@@ -311,8 +285,8 @@ def refuse(rows: NDArray[np.int64], session: Session) -> None:
     """End episodes whose step Coal found to touch, or let a shield replace it."""
     rules, episodes = session.rules, session.episodes
     for index in range(rows.shape[0]):
-        if rules.shield.shape[0] > 0 and not is_stuck(rows[index], episodes):
-            fails_again(rows[index], 0, episodes)
+        if rules.shield.shape[0] > 0 and episodes.shielding[rows[index]] == 0:
+            episodes.shielding[rows[index]] = REFUSED
         else:
             refuse_step(rows[index], rules, episodes)
 

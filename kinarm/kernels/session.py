@@ -46,6 +46,7 @@ def layouts(
     drive: int = 0,
     goal_width: int = 0,
     looks: int = 0,
+    shares: int = 0,
 ) -> tuple[Layout, Layout]:
     """Layouts of a block and of a single episode's space.
 
@@ -66,6 +67,8 @@ def layouts(
         Length of goals; 0 for standing points that are reached at once.
     looks : int
         1 for a shield that looks at what follows from a step, else 0.
+    shares : int
+        Shares of a step that a shield may try.
     """
     has_plant, beyond = Fixed(plant > 0), Fixed(goal_width > 0)
     block = {
@@ -107,7 +110,7 @@ def layouts(
         # Distance to the goal [m], return, steps taken, and step to hand back; 1 for an episode
         # that is there, and for a step under way that Coal found free, else 0.
         **dict.fromkeys(
-            ("distance", "total", "steps", "stop", "alive", "cleared", "attempt"), (ONE,)
+            ("distance", "total", "steps", "stop", "alive", "cleared", "shielding"), (ONE,)
         ),
         # Weighted terms of the last reward.
         "terms": (ONE, n_terms),
@@ -121,8 +124,9 @@ def layouts(
         "plane": (ONE, Fixed(PLANE)),
         # How a height changes with each joint.
         "slopes": (ONE, n_actuated),
-        # The step that was wanted.
-        "step": (ONE, n_actuated),
+        # The step that was wanted, its projection, and squared distances of its shares from it.
+        **dict.fromkeys(("step", "projected"), (ONE, n_actuated)),
+        "off": (shares,),
         # Where bodies of the scene that move are before and after the step [m].
         "moved": (n_placed, Fixed(6)),
         # See `kinarm.kernels.planes.separate`.
@@ -131,10 +135,11 @@ def layouts(
     }
     in_lanes: Shapes = {name: (lanes, shape) for name, shape in block.items()}
     numbers: Shapes = {name: (types.float64, shape) for name, shape in alone.items()}
-    # Episode in each lane, and one to be put there again, -1 for none; open pairs, and
-    # configurations of each.
-    in_lanes["row"] = in_lanes["again"] = (types.int64, (Fixed(LANES),))
+    # Episode in each lane, -1 for none; open pairs, and configurations of each; and 1 for pairs
+    # that are looked at first.
+    in_lanes["row"] = (types.int64, (Fixed(LANES),))
     numbers["listed"] = (types.int64, (n_pairs + 1, Fixed(2)))
+    numbers["suspected"] = (types.int64, (n_pairs,))
     return Layout("Block", in_lanes), Layout("Alone", numbers)
 
 
@@ -190,10 +195,8 @@ def load_episode(
     as_numbers(block.steps)[0, lane] = episodes.steps[e]
     as_numbers(block.stop)[0, lane] = episodes.stop[e]
     as_numbers(block.cleared)[0, lane] = 1.0 if episodes.cleared[e] else 0.0
-    as_numbers(block.attempt)[0, lane] = episodes.attempt[e]
+    as_numbers(block.shielding)[0, lane] = episodes.shielding[e]
     as_numbers(block.alive)[0, lane] = 1.0
-    if block.holds.shape[0] > 0:
-        as_numbers(block.holds)[0, lane] = 0.0
 
 
 @inlined
@@ -234,6 +237,7 @@ class SessionFields(NamedTuple):
     episodes: Episodes
     block: Block
     alone: Alone
+    tries: Block
     ahead: Block
 
 
@@ -267,11 +271,15 @@ class Session(Record):
             "drive": self.episodes.drive.shape[1],
             "goal_width": self.episodes.pursuit.reached.shape[1],
             "looks": int(lags and len(rules.values.shield) > 0),
+            "shares": len(rules.values.shield),
         }
         space = work_space(**sizes)
         furnish(shapes.values.placed, *space)
-        ahead = layouts(**sizes)[0].record() if sizes["looks"] else space[0]
-        parts = SessionFields(chain, shapes, rules, control, episodes, *space, ahead)
+        more = [
+            layouts(**sizes)[0].record() if needed else space[0]
+            for needed in (sizes["shares"], sizes["looks"])
+        ]
+        parts = SessionFields(chain, shapes, rules, control, episodes, *space, *more)
         super().__init__(*table(parts), parts)
         self._others: list[Session] = []
 

@@ -11,13 +11,20 @@ be free of where these will be in `WARNING` seconds, if they go on as in the ste
 
 import math
 
-from kinarm.chain import Chain
-from kinarm.contact_shapes import WITH_HALFSPACE, ContactShapes
-from kinarm.episodes import Episodes, Rules
+from kinarm.contact_shapes import WITH_HALFSPACE
+from kinarm.episodes import Episodes
 from kinarm.kernels.block_proof import doubtful_steps
 from kinarm.kernels.compiling import Array, helper, inlined
-from kinarm.kernels.kinematics import forward_kinematics, place_bodies, rotated
-from kinarm.kernels.lane_copies import move_bodies, moving_frame, place_between, take
+from kinarm.kernels.kinematics import forward_kinematics, rotated
+from kinarm.kernels.lane_copies import (
+    copy_rows,
+    move_bodies,
+    move_lane,
+    moving_frame,
+    place_between,
+    spread,
+    take,
+)
 from kinarm.kernels.lanes import LANES, as_numbers, lane_bits, select
 from kinarm.kernels.planes import FINE, GAP, height_above, separate
 from kinarm.kernels.plant import (
@@ -31,13 +38,13 @@ from kinarm.kernels.plant import (
     move_joints,
 )
 from kinarm.kernels.proof import is_apart
-from kinarm.kernels.session import Alone, Block
+from kinarm.kernels.session import Block, Session
+
+REFUSED, REPLACED = 1, 2
+"""States of a step that is to be replaced, as Coal refuses it, and of one that is (`Episodes`)."""
 
 PROJECTIONS = 3
 """Largest number of projections, each of the one before."""
-
-TRIED = -1.0
-"""Distance of a projection that has been tried, or not been made."""
 
 KEPT = 1e-3
 """Distance that a projected step keeps [m]."""
@@ -55,122 +62,154 @@ MOST_STEPS = 500
 """Steps after which joints that do not rest are not looked at further."""
 
 
-@inlined
-def is_stuck(e: int, episodes: Episodes) -> bool:
-    """Whether nothing is left that may replace an episode's step."""
-    return episodes.attempt[e] > 0 and episodes.tried[e] == math.inf
-
-
-@inlined
-def fails_again(e: int, pair: int, episodes: Episodes) -> None:
-    """Note that an episode's step touches a pair, from 1; 0 if that is not known."""
-    last = episodes.projected.shape[1] - 2
-    if episodes.attempt[e] == 0:
-        episodes.tried[e], episodes.blocker[e] = 0.0, pair if pair > 0 else -1
-        episodes.projected[e, last], episodes.projected[e, last + 1] = TRIED, 0.0
-    episodes.attempt[e] += 1
-    episodes.touched[e] = pair
-
-
 @helper
-def replace_step(
-    lane: int,
-    e: int,
-    chain: Chain,
-    shapes: ContactShapes,
-    rules: Rules,
-    episodes: Episodes,
-    block: Block,
-    alone: Alone,
-) -> None:
-    """Fill in the next target of an episode whose step, or what replaced it, touches."""
-    action, target = as_numbers(block.action), as_numbers(block.target)
+def replace_step(lane: int, e: int, before: Array, poses: Array, session: Session) -> bool:
+    """Replace a step of an episode that touches; whether that leaves it free.
+
+    What may replace it is tried in the order of its distance from the step, in all lanes of
+    ``tries`` at once. Poses are ``before`` the step and at the target.
+    """
+    chain, shapes, rules, episodes = session.chain, session.shapes, session.rules, session.episodes
+    block, tries, alone = session.block, session.tries, session.alone
+    pair, lags, looks = episodes.touched[e], block.plant.shape[0] > 0, block.holds.shape[0] > 0
+    episodes.blocker[e] = pair if pair > 0 else -1
+    episodes.shielding[e] = as_numbers(block.shielding)[0, lane] = REPLACED
+    for place in range(LANES):
+        tries.row[place] = e
+    for k in range(alone.suspected.shape[0]):
+        alone.suspected[k] = 0
     # Where the step begins: the joints, or what they were last told.
-    begun, lags = as_numbers(block.q), block.plant.shape[0] > 0
+    begun = as_numbers(block.q)
     if lags:
-        begun = as_numbers(block.drive)
-    n_actuated, pair = rules.step_limit.shape[0], episodes.touched[e] - 1
-    projected, step = episodes.projected[e], alone.step[0]
-    for axis in range(n_actuated):
+        begun = as_numbers(block.former_drive)
+    list_shares(lane, begun, session)
+    source, there, last = block, poses, lane
+    n_projections, tried, nearest = 0, 0.0, math.inf
+    while True:
+        if not lags and last >= 0 and pair > 0 and n_projections < PROJECTIONS:
+            n_projections += 1
+            nearest = project_step(last, pair - 1, there, source, session)
+        begin_tries(lane, before, poses, session)
+        # Fill lanes, up to a projection or at last rest.
+        count, last, tries.alive[0] = 0, -1, 0.0
+        while count < LANES and last < 0:
+            chosen, off = -1, nearest
+            for k in range(alone.off.shape[0]):
+                if tried < alone.off[k] < off:
+                    chosen, off = k, alone.off[k]
+            put_try(count, lane, chosen, off < math.inf, begun, session)
+            tried, last = max(tried, off), count if chosen < 0 else -1
+            count += 1
+        asked, rests = (1 << count) - 1, last >= 0 and nearest == math.inf
+        named = 1 << last if last >= 0 else 0
+        if lags:
+            move_joints(chain, rules, tries.alive[0] > 0.0, tries)
+        forward_kinematics(chain, tries.target, 0, tries.after)
+        given = tries.row, tries.before, tries.after, session, tries
+        found = asked & ~doubtful_steps(tries.alive[0] > 0.0, True, named, not looks, *given)
+        if looks:
+            onward = found & ~lane_bits(tries.holds[0] > 0.0)
+            found &= ~unsafe_stops(onward, named, tries.row, tries.after, session, tries)
+        if rests and shapes.moving.shape[0] == 0 and (not looks or is_still(last, tries)):
+            # Where the arm rests, it is known to be free.
+            found |= named
+        for place in range(count):
+            if found >> place & 1 or (rests and place == last):
+                take_over(place, lane, poses, block, tries)
+                return found >> place & 1 == 1
+        source, there, pair = tries, tries.after, episodes.touched[e]
+        nearest = math.inf if last >= 0 else nearest
+
+
+@inlined
+def list_shares(lane: int, begun: Array, session: Session) -> None:
+    """Fill in the step that an episode wants, and how far shares of it are from it."""
+    chain, rules, block, alone = session.chain, session.rules, session.block, session.alone
+    action, step = as_numbers(block.action), alone.step[0]
+    for axis in range(rules.step_limit.shape[0]):
         start = begun[COMMAND, axis, lane]
         moved = start + action[0, axis, lane] * rules.step_limit[axis]
         step[axis] = min(max(moved, chain.lower[axis]), chain.upper[axis]) - start
-    if projected[n_actuated] == TRIED:
-        projected[n_actuated] = math.inf
-        if not lags and pair >= 0 and projected[n_actuated + 1] < PROJECTIONS:
-            projected[n_actuated + 1] += 1.0
-            place_scene(lane, e, shapes, rules, episodes, block, alone)
-            project_step(lane, pair, chain, shapes, rules, projected, block, alone)
-    chosen, nearest = -1, projected[n_actuated]
     for k in range(rules.shield.shape[0]):
         off = 0.0
-        for axis in range(n_actuated):
+        for axis in range(rules.step_limit.shape[0]):
             left = (1.0 - rules.shield[k, axis]) * step[axis]
             off += left * left
-        if off > episodes.tried[e] and off < nearest:
-            chosen, nearest = k, off
-    projects = chosen < 0 and nearest < math.inf
-    for axis in range(n_actuated):
+        alone.off[k] = off
+
+
+@inlined
+def put_try(
+    place: int, lane: int, chosen: int, moves: bool, begun: Array, session: Session
+) -> None:
+    """Put a share of a step into a lane; without, its projection if it ``moves``, or rest."""
+    chain, rules, tries, alone = session.chain, session.rules, session.tries, session.alone
+    action, target = as_numbers(tries.action), as_numbers(tries.target)
+    as_numbers(tries.alive)[0, place] = 1.0
+    for axis in range(rules.step_limit.shape[0]):
         moved = start = begun[COMMAND, axis, lane]
         if chosen >= 0:
-            moved += rules.shield[chosen, axis] * step[axis]
-        elif projects:
-            moved = projected[axis]
-        if lags:
-            action[0, axis, lane] = (moved - start) / rules.step_limit[axis]
+            moved += rules.shield[chosen, axis] * alone.step[0, axis]
+        elif moves:
+            moved = alone.projected[0, axis]
+        if tries.plant.shape[0] > 0:
+            action[0, axis, place] = (moved - start) / rules.step_limit[axis]
         else:
-            target[0, axis, lane] = min(max(moved, chain.lower[axis]), chain.upper[axis])
-    episodes.tried[e] = max(episodes.tried[e], nearest)
-    if projects:
-        projected[n_actuated] = TRIED
-        if block.holds.shape[0] > 0:
-            # It leaves a body that comes, perhaps not as far as wanted.
-            as_numbers(block.holds)[0, lane] = 1.0
-    elif chosen < 0 and block.holds.shape[0] > 0:
-        as_numbers(block.holds)[0, lane] = 1.0
-    elif chosen < 0:
-        # Where the arm rests, it is known to be free.
-        as_numbers(block.cleared)[0, lane] = 1.0
+            target[0, axis, place] = min(max(moved, chain.lower[axis]), chain.upper[axis])
+    if tries.holds.shape[0] > 0:
+        # A projection leaves a body that comes, perhaps not as far as wanted.
+        as_numbers(tries.holds)[0, place] = 1.0 if chosen < 0 else 0.0
 
 
 @inlined
-def place_scene(
-    lane: int,
-    e: int,
-    shapes: ContactShapes,
-    rules: Rules,
-    episodes: Episodes,
-    block: Block,
-    alone: Alone,
-) -> None:
-    """Put an episode's bodies where they are at the end of its step, if they are its own."""
-    if episodes.scenes.shape[0] > 0:
-        place_bodies(episodes.scenes[e], alone.before)
-        place_bodies(episodes.scenes[e], alone.after)
-        step = int(as_numbers(block.steps)[0, lane]) + 1
-        for k in range(shapes.moving.shape[0]):
-            for i in range(3):
-                position = episodes.scenes[e, shapes.moving[k], 13 + i] + rules.moves[step, k, i]
-                alone.moved[k, i] = alone.moved[k, 3 + i] = position
+def begin_tries(lane: int, before: Array, poses: Array, session: Session) -> None:
+    """Put what an episode's step begins with, and where bodies go, into all lanes of tries."""
+    block, tries = session.block, session.tries
+    spread(block.q, lane, tries.q)
+    spread(block.target, lane, tries.target)
+    spread(block.plant, lane, tries.plant)
+    spread(block.former_drive, lane, tries.drive)
+    spread(block.planes, lane, tries.planes)
+    for pair in range(block.height.shape[0]):
+        tries.planes[pair, GAP] = as_numbers(block.height)[pair, lane]
+    tries.steps[0] = as_numbers(block.steps)[0, lane]
+    for frame in range(block.q.shape[1] + 1, poses.shape[0]):
+        for i in range(poses.shape[1]):
+            tries.before[frame, i] = as_numbers(before)[frame, i, lane]
+            tries.after[frame, i] = as_numbers(poses)[frame, i, lane]
 
 
 @inlined
-def project_step(
-    lane: int,
-    pair: int,
-    chain: Chain,
-    shapes: ContactShapes,
-    rules: Rules,
-    projected: Array,
-    block: Block,
-    alone: Alone,
-) -> None:
-    """Project an episode's target off the plane between two bodies.
+def take_over(place: int, lane: int, poses: Array, block: Block, tries: Block) -> None:
+    """Take a try for the step of an episode."""
+    move_lane(tries.target, place, block.target, lane)
+    move_lane(tries.planes, place, block.planes, lane)
+    move_lane(tries.after, place, poses, lane)
+    for pair in range(block.height.shape[0]):
+        as_numbers(block.height)[pair, lane] = as_numbers(tries.height)[pair, place]
+    if block.plant.shape[0] > 0:
+        move_lane(tries.drive, place, block.drive, lane)
+        move_lane(tries.action, place, block.action, lane)
 
-    Fills in joint positions, and their squared distance from the step that was wanted.
+
+@inlined
+def project_step(lane: int, pair: int, poses: Array, block: Block, session: Session) -> float:
+    """Project the target of a lane off the plane between two bodies.
+
+    Takes the poses there. Fills in joint positions, and returns their squared distance from the
+    step that was wanted.
     """
+    chain, shapes, rules, alone = session.chain, session.shapes, session.rules, session.alone
     q, target, plane = as_numbers(block.q), as_numbers(block.target), alone.plane
-    n_actuated = rules.step_limit.shape[0]
+    n_actuated, projected = rules.step_limit.shape[0], alone.projected[0]
+    # Bodies are where they are at the end of the step.
+    for frame in range(block.q.shape[1] + 1, poses.shape[0]):
+        take(poses, frame, lane, alone.before, frame)
+        take(poses, frame, lane, alone.after, frame)
+    for k in range(shapes.moving.shape[0]):
+        for i in range(3):
+            position = alone.after[moving_frame(shapes, k, poses), 13 + i]
+            alone.moved[k, i] = alone.moved[k, 3 + i] = position
     place_between(0, 1, lane, chain, shapes, block, alone, alone.before)
     place_between(0, 1, lane, chain, shapes, block, alone, alone.after)
     take(block.planes, pair, lane, plane, 0)
@@ -186,7 +225,7 @@ def project_step(
         alone.slopes[0, axis] = slope
         ahead += slope * (target[0, axis, lane] - q[0, axis, lane])
         squares += slope * slope
-    wanted = KEPT + approach(lane, pair, shapes, rules, block, alone)
+    wanted = KEPT + approach(lane, pair, block, session)
     pushed, off = max(wanted - ahead, 0.0) / squares, 0.0
     for axis in range(n_actuated):
         start, limit = q[0, axis, lane], rules.step_limit[axis]
@@ -195,14 +234,13 @@ def project_step(
         projected[axis] = min(max(moved, chain.lower[axis]), chain.upper[axis])
         left = projected[axis] - start - alone.step[0, axis]
         off += left * left
-    projected[n_actuated] = off
+    return off
 
 
 @inlined
-def approach(
-    lane: int, pair: int, shapes: ContactShapes, rules: Rules, block: Block, alone: Alone
-) -> float:
+def approach(lane: int, pair: int, block: Block, session: Session) -> float:
     """How far a body that moves comes in `WARNING` seconds along its plane's normal, or 0 [m]."""
+    shapes, rules, alone = session.shapes, session.rules, session.alone
     frame, plane, way = shapes.planes[pair, 4], alone.plane, 0.0
     normal = rotated(alone.before, frame, plane[0, 0], plane[0, 1], plane[0, 2])
     step = int(as_numbers(block.steps)[0, lane]) + 1
@@ -220,53 +258,35 @@ def take_down(lane: int, e: int, episodes: Episodes, block: Block) -> None:
     if episodes.replaced.shape[0] > 0:
         step = int(as_numbers(block.steps)[0, lane]) - 1
         episodes.replaced[e, step] = episodes.blocker[e]
-    episodes.attempt[e] = 0
-    as_numbers(block.attempt)[0, lane] = 0.0
-    if block.holds.shape[0] > 0:
-        as_numbers(block.holds)[0, lane] = 0.0
+    episodes.shielding[e] = 0
+    as_numbers(block.shielding)[0, lane] = 0.0
 
 
 @inlined
-def held_at_rest(block: Block) -> int:
-    """Bits of lanes whose arm holds its command and does not move."""
-    still = block.holds[0] > 0.0
-    for joint in range(block.q.shape[1]):
-        still = still & (abs(block.target[0, joint] - block.q[0, joint]) <= ROUNDING)
-    return lane_bits(still)
+def is_still(lane: int, block: Block) -> bool:
+    """Whether an arm does not move in its step."""
+    q, target, farthest = as_numbers(block.q), as_numbers(block.target), 0.0
+    for joint in range(q.shape[1]):
+        farthest = max(farthest, abs(target[0, joint, lane] - q[0, joint, lane]))
+    return farthest <= ROUNDING
 
 
 @helper
 def unsafe_stops(
-    asked: int,
-    row: Array,
-    poses: Array,
-    chain: Chain,
-    shapes: ContactShapes,
-    rules: Rules,
-    episodes: Episodes,
-    block: Block,
-    ahead: Block,
-    alone: Alone,
+    asked: int, named: int, row: Array, poses: Array, session: Session, block: Block
 ) -> int:
     """Bits of lanes, of those ``asked``, whose arm is not proven to stay free after its step.
 
     It holds its command until its joints rest, or moving bodies have gone on for `WARNING`
-    seconds. Takes the poses at the target; ``ahead`` is work space.
+    seconds. Takes the poses at the target, and notes which pair of ``named`` lanes touches.
     """
-    n_actuated, warned = rules.step_limit.shape[0], 0.0
-    if shapes.moving.shape[0] > 0:
-        warned = math.ceil(WARNING / rules.time_step)
-    for joint in range(block.q.shape[1]):
-        ahead.q[0, joint] = ahead.target[0, joint] = block.target[0, joint]
-    for pair in range(block.planes.shape[0]):
-        for i in range(block.planes.shape[1]):
-            ahead.planes[pair, i] = block.planes[pair, i]
-    for k in range(block.drive.shape[0]):
-        for axis in range(n_actuated):
-            ahead.drive[k, axis] = block.drive[k, axis]
-    if block.plant.shape[0] > 0:
-        for i in range(block.plant.shape[1]):
-            ahead.plant[0, i] = block.plant[0, i]
+    chain, shapes, rules, ahead = session.chain, session.shapes, session.rules, session.ahead
+    warned = math.ceil(WARNING / rules.time_step) if shapes.moving.shape[0] > 0 else 0.0
+    copy_rows(block.target, ahead.q)
+    copy_rows(block.target, ahead.target)
+    copy_rows(block.planes, ahead.planes)
+    copy_rows(block.drive, ahead.drive)
+    copy_rows(block.plant, ahead.plant)
     before, after = ahead.before, ahead.after
     for frame in range(poses.shape[0] - shapes.placed.shape[0], poses.shape[0]):
         for i in range(poses.shape[1]):
@@ -274,7 +294,7 @@ def unsafe_stops(
     ahead.holds[0] = ahead.alive[0] = 0.0 * block.q[0, 0] + 1.0
     unsafe, waiting, passed = 0, asked, 0.0
     while True:
-        waiting &= ~lane_bits(comes_to_rest(passed, warned, chain, shapes, rules, ahead))
+        waiting &= ~lane_bits(comes_to_rest(passed, warned, session))
         if waiting == 0:
             return unsafe
         if passed >= MOST_STEPS:
@@ -287,27 +307,25 @@ def unsafe_stops(
         if shapes.moving.shape[0] > 0:
             for lane in range(LANES):
                 if waiting >> lane & 1:
-                    step, scenes = int(as_numbers(block.steps)[0, lane]) + 1, episodes.scenes
-                    gone = min(passed, warned)
+                    step, gone = int(as_numbers(block.steps)[0, lane]) + 1, min(passed, warned)
+                    scenes = session.episodes.scenes
                     move_bodies(row[lane], step, lane, shapes, rules, scenes, after, gone)
         for lane in range(LANES):
             as_numbers(ahead.alive)[0, lane] = 1.0 if waiting >> lane & 1 else 0.0
-        given = row, before, after, chain, shapes, rules, episodes
-        found = doubtful_steps(ahead.alive[0] > 0.0, passed == 1.0, *given, ahead, alone)
+        given = named, False, row, before, after, session, ahead
+        found = doubtful_steps(ahead.alive[0] > 0.0, passed == 1.0, *given)
         unsafe, waiting = unsafe | found, waiting & ~found
-        for joint in range(ahead.q.shape[1]):
-            ahead.q[0, joint] = ahead.target[0, joint]
+        copy_rows(ahead.target, ahead.q)
 
 
 @inlined
-def comes_to_rest(
-    passed: float, warned: float, chain: Chain, shapes: ContactShapes, rules: Rules, ahead: Block
-) -> bool:
+def comes_to_rest(passed: float, warned: float, session: Session) -> bool:
     """Whether arms that hold their command stay free from now on, on any way to rest.
 
     Where no limit acts from now on, v^2 + (rate e)^2 never rises, for the velocity v and the error
     e of a servo: a joint goes no farther than |e| plus the root of it, divided by the rate.
     """
+    chain, shapes, rules, ahead = session.chain, session.shapes, session.rules, session.ahead
     n_actuated, plant = rules.step_limit.shape[0], ahead.plant
     calm = 0.0 * ahead.q[0, 0] + passed >= warned
     for axis in range(n_actuated):

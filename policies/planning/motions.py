@@ -51,7 +51,7 @@ class Motions:
         middle = 0.5 * (shapes.extents[:, 0] + shapes.extents[:, 1])
         radii = [
             np.sqrt(np.square(shapes.corners[first:last] - centre).sum(axis=1).max())
-            for centre, (first, last, _) in zip(middle, shapes.bodies, strict=True)
+            for centre, (first, last) in zip(middle, shapes.bodies[:, :2], strict=True)
         ]
         self._balls = np.column_stack([middle, radii])
         self.farthest = shapes.farthest
