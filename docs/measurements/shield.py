@@ -14,13 +14,13 @@ from typing import Any
 import numpy as np
 
 from kinarm import Simulator
-from kinarm.episodes import Rollouts
+from kinarm.episodes import RUNNING, Rollouts
 from kinarm.policies import load_policy
 from tests.helpers.random_scenes import CLUTTER, among, swinging
 from tests.helpers.reference_episodes import held_actions
 
-HELD, EPISODES, TRIALS = 8, 1000, 400
-"""Steps for which a random action is held, episodes at a time, and trials among balls."""
+HELD, EPISODES, TRIALS, PUSHES = 8, 1000, 400, 200
+"""Steps for which a random action is held, episodes at a time, trials among balls, and pushes."""
 
 
 def random_rollouts(simulator: Simulator) -> Iterator[Rollouts]:
@@ -59,6 +59,23 @@ def beside_balls(speed: float) -> dict[str, Any]:
     return row
 
 
+def pushing() -> dict[str, Any]:
+    """Processor time of steps of a UR5 with pieces that pushes into what is around it [ms]."""
+    simulator, rng = Simulator("ring-ur5", threads=1).shielded(), np.random.default_rng(0)
+    times, replaced = list[float](), 0
+    for _ in range(PUSHES):
+        episodes = simulator.reset(*simulator.sample(rng, 1))
+        push = rng.uniform(-1, 1, (1, simulator.n_actions))
+        push /= np.abs(push).max()
+        while episodes.status[0] == RUNNING:
+            begun = time.process_time()
+            simulator.step(episodes, push)
+            times.append(1e3 * (time.process_time() - begun))
+        replaced += int(episodes.interventions[0])
+    median, most = np.quantile(times, [0.5, 0.99]).round(2)
+    return {"steps": len(times), "replaced": replaced, "median": median, "most": most}
+
+
 def measure(least: int) -> dict[str, Any]:
     """Everything for the tables."""
     worlds = {
@@ -67,6 +84,7 @@ def measure(least: int) -> dict[str, Any]:
     }
     return {
         "trials": TRIALS,
+        "pushing": pushing(),
         "balls": [beside_balls(speed) for speed in (0.2, 0.5, 1.0, 2.0)],
         "random": [random_steps(name, each, least) for name, each in worlds.items()],
     }
