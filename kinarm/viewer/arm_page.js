@@ -49,7 +49,7 @@ class ArmControls extends Controls {
     this.sliders = data.joints.map((name, k) => this.slider(name, k));
     element("name").textContent = data.arm;
     element("eyebrow").textContent = `${count(data.joints.length, "joint")} · reach at most ${data.reach.toFixed(2)} m`;
-    this.connect(this.actions);
+    this.connect();
     this.preferTheme();
     this.set(data.home);
   }
@@ -115,9 +115,6 @@ class ArmControls extends Controls {
     return {
       home: () => this.set(this.data.home),
       shapes: () => this.showShapes(!this.withShapes),
-      view: () => this.stage.look(1),
-      theme: () => this.toggleTheme(),
-      help: toggleKeys,
     };
   }
 
@@ -141,9 +138,7 @@ class ArmControls extends Controls {
       ArrowRight: step(1),
       h: actions.home,
       c: actions.shapes,
-      r: actions.view,
-      t: actions.theme,
-      "?": actions.help,
+      r: this.resetView,
     };
   }
 

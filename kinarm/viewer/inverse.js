@@ -4,22 +4,7 @@ const STARTS = 16; // configurations from which a solution is sought, beside the
 const MOST_ROUNDS = 30;
 const MOST_IMPROVED = 6; // solutions that are brought nearer
 const FEW_ROUNDS = 12; // to bring it nearer
-const DAMPING = 1e-3;
-
-/** Solution of a symmetric system, by Gauss' elimination. */
-function solved(matrix, right) {
-  const rows = matrix.map((row, i) => [...row, right[i]]);
-  rows.forEach((pivot, i) => {
-    for (const row of rows.slice(i + 1)) {
-      const share = row[i] / pivot[i];
-      pivot.forEach((value, j) => { row[j] -= share * value; });
-    }
-  });
-  return rows.reduceRight((found, row, i) => {
-    const known = found.reduce((sum, value, j) => sum + value * row[i + 1 + j], 0);
-    return [(row[row.length - 1] - known) / row[i], ...found];
-  }, []);
-}
+const [DAMPING, SWEEPS] = [1e-3, 4]; // of a round of least squares
 
 /** Configurations from which solutions are sought: always the same. */
 function* anywhere({ lower, upper }, q) {
@@ -29,7 +14,7 @@ function* anywhere({ lower, upper }, q) {
   }
 }
 
-/** Searches configurations that reach a goal, by damped least squares. */
+/** Searches configurations that reach a goal, by damped least squares within bounds. */
 class Search {
   constructor(simulator, goal) {
     Object.assign(this, { simulator, goal, step: simulator.step });
@@ -48,20 +33,24 @@ class Search {
 
   /** From a configuration to one that reaches the goal within bounds of the joints, or null. */
   from(start, lower, upper, rounds) {
-    const within = (value, k) => (k < lower.length ? clamp(value, lower[k], upper[k]) : value);
-    let at = start.map(within);
+    const at = start.map((value, k) => (k < lower.length ? clamp(value, lower[k], upper[k]) : value));
     for (let round = 0; !this.simulator.within(this.errors(at)); round++) {
       if (round === rounds) {
         return null;
       }
-      // How errors change with each joint, by its step; a joint at its bound rests.
-      const now = this.misses(at);
-      const slopes = this.step.map((limit, k) => this.misses(at.map((value, i) => value + (i === k ? 1e-5 * limit : 0))).map((value, i) => (value - now[i]) / 1e-5));
-      const right = slopes.map((row) => -row.reduce((sum, value, n) => sum + value * now[n], 0));
-      const free = slopes.map((_, k) => !(right[k] < 0 && at[k] <= lower[k]) && !(right[k] > 0 && at[k] >= upper[k]));
-      const matrix = slopes.map((row, i) => slopes.map((other, j) => (i === j ? DAMPING : 0) + (free[i] && free[j] ? row.reduce((sum, value, n) => sum + value * other[n], 0) : 0)));
-      const moves = solved(matrix, right.map((value, k) => (free[k] ? value : 0)));
-      at = at.map((value, k) => within(value + (k < moves.length ? moves[k] * this.step[k] : 0), k));
+      // How errors change with each joint, by its step; then one joint's move after another's.
+      const left = this.misses(at);
+      const slopes = this.step.map((limit, k) => this.misses(at.map((value, i) => value + (i === k ? 1e-5 * limit : 0))).map((value, i) => (value - left[i]) / 1e-5));
+      const begun = [...at];
+      for (let sweep = 0; sweep < SWEEPS; sweep++) {
+        slopes.forEach((slope, k) => {
+          const [pull, stiffness] = [left, slope].map((other) => slope.reduce((sum, value, n) => sum + value * other[n], 0));
+          const damped = pull + (DAMPING * (at[k] - begun[k])) / this.step[k];
+          const moved = clamp(at[k] - (damped / (stiffness + DAMPING)) * this.step[k], lower[k], upper[k]);
+          slope.forEach((value, n) => { left[n] += (value * (moved - at[k])) / this.step[k]; });
+          at[k] = moved;
+        });
+      }
     }
     return at;
   }

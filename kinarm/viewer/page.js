@@ -62,11 +62,13 @@ function toggleKeys() {
   element("help").setAttribute("aria-expanded", String(!element("keys").hidden));
 }
 
-/** What buttons and keys of a page do; pages have their own `keys`. */
+/** What buttons and keys of a page do; pages have their own `actions` and `keys`. */
 class Controls {
   constructor(stage, data) {
     Object.assign(this, { stage, data, playing: false });
     this.calm = window.matchMedia("(prefers-reduced-motion: reduce)").matches;
+    this.toggleTheme = () => this.setTheme(this.theme === "dark" ? "light" : "dark");
+    this.resetView = () => stage.look(stage.side);
   }
 
   setPlaying(playing) {
@@ -95,17 +97,14 @@ class Controls {
     this.stage.theme(name);
   }
 
-  toggleTheme() {
-    this.setTheme(this.theme === "dark" ? "light" : "dark");
-  }
-
   preferTheme() {
     this.setTheme(window.matchMedia("(prefers-color-scheme: dark)").matches ? "dark" : "light");
   }
 
-  /** Connect buttons, by their ids, with actions, and keys. */
-  connect(actions) {
-    for (const [id, action] of Object.entries(actions)) {
+  /** Connect buttons, by their ids, with the page's actions, and keys. */
+  connect() {
+    const actions = { theme: this.toggleTheme, view: this.resetView, help: toggleKeys };
+    for (const [id, action] of Object.entries({ ...actions, ...this.actions })) {
       element(id).addEventListener("click", action);
     }
     document.addEventListener("keydown", (event) => this.press(event));
@@ -121,7 +120,8 @@ class Controls {
     if (event.ctrlKey || event.metaKey || event.altKey || this.owns(event.target, event.key)) {
       return;
     }
-    const action = this.keys[event.key.length > 1 ? event.key : event.key.toLowerCase()];
+    const keys = { t: this.toggleTheme, "?": toggleKeys, ...this.keys };
+    const action = keys[event.key.length > 1 ? event.key : event.key.toLowerCase()];
     if (action) {
       event.preventDefault();
       action(event);

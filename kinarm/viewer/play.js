@@ -19,7 +19,7 @@ class Playground extends Controls {
     this.simulator.servo = this.simulator.servos.find(({ hertz }) => hertz === data.plant.servo);
     Object.assign(this.simulator, { delay: data.plant.delay, shield: data.shield });
     this.fill();
-    this.connect(this.actions);
+    this.connect();
     this.takePointers();
     this.preferTheme();
     this.reset();
@@ -31,8 +31,7 @@ class Playground extends Controls {
     const option = (id, value, words, chosen) => element(id).append(make("option", { value, ...(chosen && { selected: "" }) }, words));
     data.policies.forEach(({ name }, k) => option("policy", k, name, k === 0));
     simulator.servos.forEach(({ hertz }, k) => option("servo", k, hertz ? `${hertz} Hz` : "none", hertz === data.plant.servo));
-    const longest = Math.max(2, data.plant.delay);
-    for (let delay = 0; delay <= longest; delay++) {
+    for (let delay = 0; delay <= Math.max(2, data.plant.delay); delay++) {
       option("delay", delay, delay ? count(delay, "step") : "none", delay === data.plant.delay);
     }
     const choose = (id, change) => element(id).addEventListener("change", () => {
@@ -46,7 +45,7 @@ class Playground extends Controls {
     element("speed").addEventListener("change", () => { this.speed = Number(element("speed").value); });
     element("eyebrow").textContent = `${data.arm} · drag the cube, or an obstacle`;
     element("turn").hidden = element("turn-key").hidden = element("angle-row").hidden = simulator.task.kind === "position";
-    element("shield").setAttribute("aria-pressed", String(simulator.shield));
+    this.toggle("shield", simulator.shield);
   }
 
   get actions() {
@@ -56,9 +55,6 @@ class Playground extends Controls {
       next: () => this.reset((this.trial + 1) % this.data.trials.starts.length),
       turn: () => this.toggle("turn", (this.turning = !this.turning)),
       shield: () => { this.toggle("shield", (this.simulator.shield = !this.simulator.shield)); this.restart(); },
-      view: () => this.stage.look(this.stage.side),
-      theme: () => this.toggleTheme(),
-      help: toggleKeys,
     };
   }
 
@@ -108,10 +104,6 @@ class Playground extends Controls {
     const at = goal.slice(0, 3).map((value, k) => clamp(value, k === 2 ? Math.min(this.state.goal[2], 0) : -far, far));
     this.simulator.turnTo(this.state, [...at, ...goal.slice(3)]);
     this.started();
-  }
-
-  moveGoal(by) {
-    this.setGoal(this.state.goal.map((value, k) => value + (by[k] ?? 0)));
   }
 
   /** Turn the goal about an axis of the world [rad]. */
@@ -248,7 +240,7 @@ class Playground extends Controls {
       if (event.shiftKey && this.state.goal.length > 3) {
         this.turnGoal(axis, way * NUDGE[1]);
       } else {
-        this.moveGoal(axis.map((value) => way * NUDGE[0] * value));
+        this.setGoal(this.state.goal.map((value, k) => value + way * NUDGE[0] * (axis[k] ?? 0)));
       }
     };
     return {
@@ -256,7 +248,7 @@ class Playground extends Controls {
       ArrowUp: nudge(nearest(back), -1), ArrowDown: nudge(nearest(back), 1),
       PageUp: nudge([0, 0, 1], 1), PageDown: nudge([0, 0, 1], -1),
       " ": actions.play, r: actions.reset, n: actions.next, s: actions.shield,
-      v: actions.view, t: actions.theme, "?": actions.help,
+      v: this.resetView,
     };
   }
 }

@@ -93,7 +93,7 @@ class Player extends Controls {
     this.list = new TrialList(data, (index) => this.select(index));
     element("list-key").hidden = !data.groups.length;
     element("trial-choice").hidden = data.trials.length < 2;
-    this.connect(this.actions);
+    this.connect();
     this.takeInput();
     this.preferTheme();
     this.select(0);
@@ -137,22 +137,14 @@ class Player extends Controls {
   }
 
   seek(frame) {
-    this.pause();
+    this.setPlaying(false);
     this.show(Math.round(frame));
   }
 
-  play() {
-    if (this.time >= this.frames) {
+  setPlaying(playing) {
+    if (playing && this.time >= this.frames) {
       this.show(0);
     }
-    this.setPlaying(true);
-  }
-
-  pause() {
-    this.setPlaying(false);
-  }
-
-  setPlaying(playing) {
     super.setPlaying(playing);
     this.held = 0;
   }
@@ -180,15 +172,12 @@ class Player extends Controls {
 
   get actions() {
     return {
-      play: () => this.toggle(),
+      play: () => this.setPlaying(!this.playing),
       first: () => this.seek(0),
       back: () => this.seek(Math.ceil(this.time) - 1),
       forward: () => this.seek(Math.floor(this.time) + 1),
       previous: () => this.select(this.index - 1),
       next: () => this.select(this.index + 1),
-      view: () => this.stage.look(this.stage.side),
-      theme: () => this.toggleTheme(),
-      help: toggleKeys,
     };
   }
 
@@ -209,14 +198,6 @@ class Player extends Controls {
     plot.addEventListener("pointermove", (event) => plot.hasPointerCapture(event.pointerId) && drag(event));
   }
 
-  toggle() {
-    if (this.playing) {
-      this.pause();
-    } else {
-      this.play();
-    }
-  }
-
   get keys() {
     const { actions } = this;
     const faster = (by) => this.setSpeed(SPEEDS[Math.min(Math.max(SPEEDS.indexOf(this.speed) + by, 0), SPEEDS.length - 1)]);
@@ -231,9 +212,7 @@ class Player extends Controls {
       l: () => this.list.toggle(),
       ",": () => faster(-1),
       ".": () => faster(1),
-      r: actions.view,
-      t: actions.theme,
-      "?": actions.help,
+      r: this.resetView,
     };
   }
 
@@ -252,15 +231,15 @@ function main(viewer, data) {
   window.kinarm = {
     seek: (frame) => player.seek(frame),
     select: (index) => player.select(index),
-    play: () => player.play(),
-    pause: () => player.pause(),
+    play: () => player.setPlaying(true),
+    pause: () => player.setPlaying(false),
     lookFrom: (eye, target) => stage.lookFrom(eye, target),
     pose: (name, run) => stage.poseOf(name, run),
     census: () => stage.census(),
     get state() { return player.state; },
   };
   if (!player.calm) {
-    player.play();
+    player.setPlaying(true);
   }
 }
 

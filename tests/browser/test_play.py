@@ -176,8 +176,8 @@ def test_nearest_solutions(page, trials):
         moved = np.abs(q - start)[: len(rules.step_limit)] / rules.step_limit
         assert np.ceil(moved.max() - 1e-6) == found["steps"]
     more = np.array([found["steps"] for found in solutions]) - floor
-    assert np.median(more) == 0
-    assert (np.abs(more) <= 1).mean() > 0.9
+    assert (more == 0).mean() > 0.9
+    assert np.abs(more).max() <= 2
 
 
 def test_nothing_is_fetched_and_nothing_fails(watched):
