@@ -6,6 +6,7 @@ import pinocchio as pin
 import pytest
 
 from kinarm.arm import Arm
+from kinarm.bodies import Body
 from kinarm.collision import ContactModel
 from kinarm.contact_pairs import make_verdicts_reliable
 from kinarm.scene import Obstacle, Scene
@@ -16,7 +17,8 @@ CLOSE, CLOSE_IF_ROUND = 1e-6, 2e-6
 """Distances within which verdicts may differ; those of Coal from cylinders err by 1e-6 [m]."""
 
 TURNED = Obstacle(name="turned", lower=(0.25, -0.1, 0.0), upper=(0.4, 0.1, 0.2), yaw=0.6)
-SCENE = Scene(obstacles=(*Scene().obstacles, TURNED))
+WALL = Body(name="wall", shape="halfspace", position=(-0.6, 0.0, 0.0), rpy=(0.1, 1.5, 0.0))
+SCENE = Scene(obstacles=(*Scene().obstacles, TURNED, WALL))
 POSES = """(q) => {
     kinarm.set(q);
     return [q.map((_, k) => kinarm.pose(`axis_${k + 1}`)), kinarm.state.tool];
