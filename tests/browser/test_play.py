@@ -322,8 +322,8 @@ def test_lag_delay_and_policy_are_chosen(watched):
         watched.page.select_option(name, "0")
 
 
-@pytest.mark.parametrize("size", [(390, 844), (844, 390), (320, 568)])
-def test_a_phone_shows_everything(watched, size):
+@pytest.mark.parametrize("size", [(390, 844), (844, 390), (320, 568), (760, 560)])
+def test_a_phone_or_a_frame_shows_everything(watched, size):
     watched.page.set_viewport_size({"width": size[0], "height": size[1]})
     watched.page.keyboard.press("s")
     watched.check_fit(size, "#card", "#dock", "#policy", "#servo", "#delay", "#speed", "#shield")
