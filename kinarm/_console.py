@@ -7,6 +7,7 @@ import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from datetime import timedelta
+from functools import cache
 from importlib.util import find_spec
 from typing import IO, TYPE_CHECKING
 
@@ -16,7 +17,7 @@ if TYPE_CHECKING:
 PIPED, UNBOUNDED = 120, 1000
 """Widths of piped output, and with room for everything."""
 
-COMPILING = "compiling, once: up to half a minute"
+COMPILING = "compiling kernels for this processor, once (about 20 s)"
 """Activity while kernels are compiled."""
 
 LINE_SECONDS = 30.0
@@ -54,6 +55,17 @@ def doing(activity: str) -> Iterator[None]:
 def _tell() -> None:
     for listener in _listeners:
         listener(_activities[-1])
+    if _activities[-1] == COMPILING and not _listeners:
+        _say_why_it_waits()
+
+
+@cache
+def _say_why_it_waits() -> None:
+    """Say on a terminal, once, that kernels are compiled, where no command and no parent does."""
+    from multiprocessing import parent_process
+
+    if parent_process() is None and sys.stderr and sys.stderr.isatty():
+        sys.stderr.write(f"kinarm: {COMPILING}...\n")
 
 
 def open_console(*, stderr: bool = False, file: IO[str] | None = None) -> "Console":

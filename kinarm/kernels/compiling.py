@@ -20,13 +20,17 @@ from typing import Any, TypeVar, cast
 
 import llvmlite
 import numpy as np
+from llvmlite.binding import create_pass_builder, create_pipeline_tuning_options
 from numba import njit, types
 from numba.core.caching import FunctionCache, IndexDataCacheFile
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import Compiler
+from numba.core.typed_passes import InlineOverloads, NopythonRewrites
+from numba.core.untyped_passes import GenericRewrites, InlineClosureLikes
 from numpy.typing import NDArray
 
 from kinarm._console import COMPILING, doing
+from kinarm.kernels.fixed_lengths import FixedLengths
 
 Array = NDArray[np.float64]
 Vector = tuple[float, float, float]
@@ -41,7 +45,7 @@ def kernel(function: Function) -> Function:
 
 def lean_kernel(function: Function) -> Function:
     """Compile such a function that works in lanes and allocates nothing."""
-    return _called_by_python(function, _nrt=False)
+    return _called_by_python(function, _nrt=False, pipeline_class=LaneCompiler)
 
 
 def _called_by_python(function: Function, **more: Any) -> Function:
@@ -64,7 +68,7 @@ def inlined(function: Function) -> Function:
 
 def helper(function: Function) -> Function:
     """Compile a long helper that allocates nothing, to be called."""
-    return _linked(function, _nrt=False)
+    return _linked(function, forceinline=False, _nrt=False)
 
 
 def _linked(function: Function, **more: Any) -> Function:
@@ -111,11 +115,38 @@ class LinkedLibrary(JITCodeLibrary):
         return 0
 
 
+class LaneLibrary(JITCodeLibrary):
+    """Code in lanes, whose loops LLVM need not turn into vectors."""
+
+    def _optimize_final_module(self) -> None:
+        tuning = create_pipeline_tuning_options(speed_level=3)
+        tuning.loop_vectorization = False
+        builder = create_pass_builder(self._codegen._tm, tuning)
+        builder.getModulePassManager().run(self._final_module, builder)
+
+
+SUPERFLUOUS = InlineClosureLikes, InlineOverloads, NopythonRewrites
+"""Passes of Numba for what kernels lack: closures, and expressions of arrays."""
+
+
 class KernelCompiler(Compiler):
     """Numba's compiler without garbage collection, which finds next to nothing there."""
 
+    library: type[JITCodeLibrary] = JITCodeLibrary
+
+    def define_pipelines(self) -> list[Any]:
+        """List Numba's passes and `FixedLengths`, without those that are superfluous."""
+        pipelines: list[Any] = super().define_pipelines()
+        for passes in pipelines:
+            passes.add_pass_after(FixedLengths, GenericRewrites)
+            passes.passes = [each for each in passes.passes if each[0] not in SUPERFLUOUS]
+            passes.finalize()
+        return pipelines
+
     def compile_extra(self, func: Callable[..., Any]) -> Any:
         """Compile a function and its helpers."""
+        self.state.library = self.library(self.state.targetctx.codegen(), func.__qualname__)
+        self.state.library.enable_object_caching()
         collects = gc.isenabled()
         gc.disable()
         try:
@@ -126,14 +157,16 @@ class KernelCompiler(Compiler):
                 gc.enable()
 
 
+class LaneCompiler(KernelCompiler):
+    """Compiles a kernel into a `LaneLibrary`."""
+
+    library = LaneLibrary
+
+
 class HelperCompiler(KernelCompiler):
     """Compiles a helper into a `LinkedLibrary`."""
 
-    def compile_extra(self, func: Callable[..., Any]) -> Any:
-        """Compile a function and its helpers."""
-        codegen = self.state.targetctx.codegen()
-        self.state.library = LinkedLibrary(codegen, func.__qualname__)
-        return super().compile_extra(func)
+    library = LinkedLibrary
 
 
 class KernelCache(FunctionCache):

@@ -10,7 +10,7 @@ from numba import types
 from kinarm.chain import Chain
 from kinarm.contact_shapes import PLANE, ContactShapes
 from kinarm.episodes import Control, Episodes, Rules
-from kinarm.kernels.compiling import Array, inlined, lean_kernel
+from kinarm.kernels.compiling import Array, helper, lean_kernel
 from kinarm.kernels.kinematics import POSE, place_bodies
 from kinarm.kernels.lane_copies import move_bodies, put, put_scene, take, take_rows
 from kinarm.kernels.lanes import LANES, as_numbers, instruction, lanes
@@ -152,7 +152,7 @@ def furnish(placed: Array, block: Block, alone: Alone) -> None:
     place_bodies(placed, alone.after)
 
 
-@inlined
+@helper
 def load_episode(
     e: int,
     lane: int,
@@ -199,7 +199,7 @@ def load_episode(
     as_numbers(block.alive)[0, lane] = 1.0
 
 
-@inlined
+@helper
 def store_episode(lane: int, e: int, episodes: Episodes, block: Block) -> None:
     """Hand an episode back and free its lane."""
     steps = int(as_numbers(block.steps)[0, lane])

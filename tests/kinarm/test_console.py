@@ -2,6 +2,7 @@
 
 import io
 import re
+from functools import cache
 
 import numpy as np
 import pytest
@@ -11,6 +12,7 @@ from kinarm import _console
 from kinarm._console import (
     COMPILING,
     ProgressLine,
+    _say_why_it_waits,
     doing,
     open_console,
     told_of_activities,
@@ -36,6 +38,21 @@ def test_a_kernel_is_told_of_once_and_its_helpers_are_not():
     assert heard == [COMPILING, ""]
     fill(np.ones(3, dtype=np.float32))  # compiled anew, and nobody listens
     assert heard == [COMPILING, ""]
+
+
+@pytest.mark.parametrize("terminal", [True, False])
+def test_a_terminal_is_told_once_where_nobody_listens(monkeypatch, terminal):
+    monkeypatch.setattr(_console, "_say_why_it_waits", cache(_say_why_it_waits.__wrapped__))
+    error = io.StringIO()
+    error.isatty = lambda: terminal
+    monkeypatch.setattr("sys.stderr", error)
+    with told_of_activities(str), doing(COMPILING):
+        pass
+    assert not error.getvalue()
+    for activity in ("learning", COMPILING, COMPILING):
+        with doing(activity):
+            pass
+    assert error.getvalue() == f"kinarm: {COMPILING}...\n" * terminal
 
 
 def test_one_within_another_is_told_of_and_the_same_is_not():
