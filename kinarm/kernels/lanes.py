@@ -8,7 +8,8 @@ episodes and blocks, with the same bits: nothing is reordered or contracted.
 
 import math
 import operator
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from types import MappingProxyType
 from typing import Any
 
 from llvmlite import ir
@@ -95,13 +96,19 @@ def _teach(
     result: types.Type,
     arity: int,
     instruction: Callable[..., Any],
+    known: Mapping[Any, types.Type] = MappingProxyType({}),
 ) -> None:
-    """Let a Python function or operator act on lanes or masks."""
+    """Let a Python function or operator act on lanes or masks.
+
+    Its results for types of Numba's own may be ``known``: Numba asks many others before it knows.
+    """
 
     class Template(AbstractTemplate):
         metadata = FIRST
 
         def generic(self, arguments: tuple[types.Type, ...], _: Any) -> Signature | None:
+            if arguments[0] in known and arguments == (arguments[0],) * arity:
+                return signature(known[arguments[0]], *arguments)
             fits = all(kind == given or (given == lanes and _is_number(kind)) for kind in arguments)
             if len(arguments) == arity and given in arguments and fits:
                 return signature(result, *[given] * arity)
@@ -111,6 +118,11 @@ def _teach(
     lower_builtin(function, *[given] * arity)(
         lambda _context, builder, _signature, arguments: instruction(builder, *arguments)
     )
+
+
+def _combine(name: str) -> Callable[..., Any]:
+    """LLVM's arithmetic of two values."""
+    return lambda builder, x, y: getattr(builder, name)(x, y)
 
 
 def _compare(symbol: str) -> Callable[..., Any]:
@@ -136,19 +148,23 @@ def _call(name: str) -> Callable[..., Any]:
     return instruction
 
 
+_sums = {kind: kind for kind in (types.float64, types.int64)}
+_truths = dict.fromkeys(_sums, types.boolean)
+
 for _operator, _name in (
     *((operator.add, "fadd"), (operator.iadd, "fadd")),
     *((operator.sub, "fsub"), (operator.isub, "fsub")),
     *((operator.mul, "fmul"), (operator.imul, "fmul")),
     *((operator.truediv, "fdiv"), (operator.itruediv, "fdiv")),
 ):
-    _teach(_operator, lanes, lanes, 2, lambda builder, x, y, n=_name: getattr(builder, n)(x, y))
+    _known = dict.fromkeys(_sums, types.float64) if _name == "fdiv" else _sums
+    _teach(_operator, lanes, lanes, 2, _combine(_name), _known)
 for _operator, _symbol in (
     *((operator.lt, "<"), (operator.le, "<="), (operator.gt, ">"), (operator.ge, ">=")),
     *((operator.eq, "=="), (operator.ne, "!=")),
 ):
-    _teach(_operator, lanes, mask, 2, _compare(_symbol))
-_teach(operator.neg, lanes, lanes, 1, lambda builder, x: builder.fneg(x))
+    _teach(_operator, lanes, mask, 2, _compare(_symbol), _truths)
+_teach(operator.neg, lanes, lanes, 1, lambda builder, x: builder.fneg(x), _sums)
 _teach(operator.and_, mask, mask, 2, lambda builder, x, y: builder.and_(x, y))
 _teach(operator.or_, mask, mask, 2, lambda builder, x, y: builder.or_(x, y))
 _teach(operator.invert, mask, mask, 1, lambda builder, x: builder.not_(x))
