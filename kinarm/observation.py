@@ -4,6 +4,7 @@ A new part is a function that writes it and an entry of `OBSERVATION`; all else 
 chooses some (`kinarm.Observation`). Policies of another layout are refused.
 """
 
+import math
 from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING, Any
 
@@ -25,6 +26,10 @@ if TYPE_CHECKING:
 
 VERSION = 1
 """To be raised when a part's meaning changes, but not its name and length."""
+
+
+FINE = 0.02
+"""Length of an offset that its fine part shows as one half [m]."""
 
 
 @inlined
@@ -49,6 +54,20 @@ def _write_offset(session: Session, seen: Seen, start: int, count: int) -> None:
     session.block.observation[0, start] = seen.goal[0, 0] - seen.tool[0]
     session.block.observation[0, start + 1] = seen.goal[0, 1] - seen.tool[1]
     session.block.observation[0, start + 2] = seen.goal[0, 2] - seen.tool[2]
+
+
+@inlined
+def _write_fine_offset(session: Session, seen: Seen, start: int, count: int) -> None:
+    """Goal minus tool point, over its length plus `FINE`."""
+    x, y, z = (
+        seen.goal[0, 0] - seen.tool[0],
+        seen.goal[0, 1] - seen.tool[1],
+        seen.goal[0, 2] - seen.tool[2],
+    )
+    scale = 1.0 / (math.sqrt(x * x + y * y + z * z) + FINE)
+    session.block.observation[0, start] = scale * x
+    session.block.observation[0, start + 1] = scale * y
+    session.block.observation[0, start + 2] = scale * z
 
 
 @inlined
@@ -136,6 +155,24 @@ def _write_rest_error(session: Session, seen: Seen, start: int, count: int) -> N
             block.observation[0, start + i - 3] = missing
 
 
+@inlined
+def _write_fine_rest_error(session: Session, seen: Seen, start: int, count: int) -> None:
+    """The same, over its length plus `FINE`."""
+    goal, block = session.rules.goal, session.block
+    if block.turn.shape[0] > 0:
+        reached = block.seen_reached
+        write_reached(goal, seen.tool, seen.frames, seen.joints, reached, 0)
+        sign = nearer_sign(goal.kind, reached, 0, seen.goal, 0)
+        squares = 0.0 * seen.tool[0]
+        for i in range(3, block.goal.shape[1]):
+            missing = seen.goal[0, i] - sign * reached[0, i]
+            squares += missing * missing
+        scale = 1.0 / (math.sqrt(squares) + FINE)
+        for i in range(3, block.goal.shape[1]):
+            missing = seen.goal[0, i] - sign * reached[0, i]
+            block.observation[0, start + i - 3] = scale * missing
+
+
 def _slides(arm: "Arm", _: Scene) -> str:
     sliding = [arm.joint_names[k] for k in np.flatnonzero(arm.chain.prismatic)]
     return f"joint {sliding[0]} slides; joint_positions takes it" if sliding else ""
@@ -197,6 +234,15 @@ OBSERVATION = (
         signs=POLAR,
         bounds=lambda ranges: (ranges.goal_lower - ranges.reach, ranges.goal_upper + ranges.reach),
         write=_write_offset,
+        of_goal=True,
+    ),
+    Part(
+        name="fine_goal_minus_tool",
+        meaning=f"goal minus tool point x, y, z, over its length plus {FINE:g} m",
+        unit="1",
+        signs=POLAR,
+        bounds=lambda _: (-UNIT, UNIT),
+        write=_write_fine_offset,
         of_goal=True,
     ),
     Part(
@@ -302,6 +348,15 @@ OBSERVATION = (
     ),
     *_rest_parts("direction", "direction x, y, z", POLAR),
     *_rest_parts("pose", "quaternion w, x, y, z", (1, -1, 1, -1)),
+    Part(
+        name="fine_rotation_error",
+        meaning="rotation error, over its length plus",
+        unit="1",
+        signs=(1, -1, 1, -1),
+        bounds=lambda _: (-UNIT, UNIT),
+        write=_write_fine_rest_error,
+        of_goal=True,
+    ),
     *_rest_parts("configuration", "position of each joint", (0,), of=JOINTS, unit="rad or m"),
 )
 """The parts in order; those per joint go through all joints in turn."""
