@@ -101,6 +101,13 @@ class Contestant:
             has_shield=True,
         )
 
+    def bare(self) -> "Contestant":
+        """A policy that learnt behind a shield without it; what others are called stays."""
+        if self.policy is None or not self.policy.shield:
+            return self
+        bare = replace(self.policy, shield=False)
+        return self.from_policy(bare_name(self.name), bare, self.source)
+
     @property
     def note(self) -> str:
         """A remark in one line, such as the statistics in use; empty if there is none."""
@@ -123,7 +130,7 @@ class Contestant:
             return None
         trained_for = self.policy.problem
         now = PROBLEMS.get(trained_for.name, trained_for)
-        return now if trained_for.tested_as(now).digest == now.digest else trained_for
+        return now if trained_for.faced_as(now).digest == now.digest else trained_for
 
     def serves(
         self,
@@ -138,7 +145,7 @@ class Contestant:
         """
         if self.policy is None:
             return True
-        trained_for = change(self.policy.problem).tested_as(problem)
+        trained_for = change(self.policy.problem).faced_as(problem)
         if self.policy.mirror is not None:
             return trained_for.covers(problem)
         return trained_for.digest == problem.digest
@@ -151,14 +158,15 @@ class Contestant:
             self.policy.check_arm(arm)
         if self.wrapped:
             return
-        own, shown = map(observation_layout, (self.policy.problem, problem))
+        seen = problem.replace(observation=self.policy.observation)
+        own, shown = map(observation_layout, (self.policy.problem, seen))
         if own != shown:
             raise PolicyFileError(
                 f"policy {self.name!r} sees other observations, {own!r}, than problem "
                 f"{problem.name!r} shows, {shown!r}"
             )
         widths = (self.policy.n_observations, self.policy.n_actions)
-        expected = (ObservationLayout.of(problem, arm).size, arm.n_actuated)
+        expected = (ObservationLayout.of(seen, arm).size, arm.n_actuated)
         if widths != expected:
             raise PolicyFileError(
                 "policy {!r} maps {} observations to {} actions; arm {!r} has {} and {}".format(

@@ -30,8 +30,13 @@ def select_pairs(request: "EvaluationRequest") -> list[Pair]:
     named = _named_problems(request)
     chosen = _named_contestants(request, named) if request.policies else _shipped(request, named)
     check_normalizing(chosen, request.vec_normalize)
-    if request.shield:
-        chosen += [each.shielded() for each in chosen if each not in UNTRAINED.values()]
+    bare = [each.bare() for each in chosen]
+    behind = [
+        each.shielded()
+        for each, without in zip(chosen, bare, strict=True)
+        if each not in UNTRAINED.values() and (request.shield or each is not without)
+    ]
+    chosen = [*bare, *(each for each in behind if each not in bare)]
     changed = partial(_changed, request)
     pairs = []
     for problem, contestant in product(named or _problems(request, chosen), chosen):
@@ -72,7 +77,7 @@ def _shipped(request: "EvaluationRequest", named: list[ReachProblem]) -> list[Co
         name
         for name, problem in PROBLEMS.items()
         if (changed := _changed(request, problem)).arm_digest == problem.arm_digest
-        and (not named or any(changed.tested_as(each).covers(each) for each in named))
+        and (not named or any(changed.faced_as(each).covers(each) for each in named))
     }
     shipped = [
         contestant

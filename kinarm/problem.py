@@ -216,9 +216,13 @@ class ReachProblem(Checked):
         """Whether another problem has the same arm and scene."""
         return self.arm_digest == other.arm_digest and self.scene == other.scene
 
-    def tested_as(self, other: "ReachProblem") -> "ReachProblem":
-        """The same problem, whose steps are tested for contact as another's are."""
-        return self.replace(tested_configurations=other.stepping.tested_configurations)
+    def faced_as(self, other: "ReachProblem") -> "ReachProblem":
+        """The same problem, tested for contact and seen as another of the same kind of goals is."""
+        alike = self.task.goal.kind == other.task.goal.kind
+        return self.replace(
+            tested_configurations=other.stepping.tested_configurations,
+            observation=other.observation if alike else None,
+        )
 
     def covers(self, other: "ReachProblem") -> bool:
         """Whether this is the other problem with any goal weights and further regions."""

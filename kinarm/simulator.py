@@ -13,6 +13,7 @@ from kinarm.errors import InvalidInputError, finite_array
 from kinarm.kernels.compiling import Array
 from kinarm.kernels.rollout import results_of_step
 from kinarm.networks import CompiledPolicy, Networks, PolicyFunction, network_control
+from kinarm.observation_choice import Observation
 from kinarm.plant import PlantLike
 from kinarm.problem import ProblemLike, ReachProblem
 from kinarm.scenarios import draw_scenarios
@@ -104,6 +105,12 @@ class Simulator(EpisodeRunner):
         """The same simulator with or without a shield."""
         other = copy(self)
         other.world = self.world.shielded(shield)
+        return other
+
+    def seen_as(self, observation: Observation) -> "Simulator":
+        """The same simulator with another observation; ProblemError if it cannot have it."""
+        other = copy(self)
+        other.world = self.world.seen_as(observation)
         return other
 
     def without_moving_bodies(self) -> "Simulator":
@@ -198,7 +205,8 @@ class Simulator(EpisodeRunner):
             ``networks()`` run compiled; a function from observations (n,
             n_observations) to actions (n, n_actions) is called once a step for
             the running episodes; if it takes ``rows``, it gets their numbers.
-            Those with the attribute ``shield`` act behind a shield: all or none.
+            Those with an attribute ``observation`` see that, those with ``shield``
+            act behind a shield: all alike.
         starts, goals, record
             As for `reset`.
         policy_index : array_like of int, shape (n,), optional
@@ -206,15 +214,9 @@ class Simulator(EpisodeRunner):
         shift : ndarray, shape (n_observations,), optional
             Collect moments of the observations about it.
         """
-        several = policies if isinstance(policies, Sequence) else (policies,)
-        n_shielded = sum(getattr(each, "shield", False) for each in several)
-        if n_shielded and not self.problem.stepping.shield:
-            if n_shielded < len(several):
-                raise InvalidInputError(
-                    "policies of one rollout must all act behind a shield or none, got "
-                    f"{n_shielded} of {len(several)}"
-                )
-            return self.shielded().rollout(
+        own = self._own_of(policies)
+        if own is not self:
+            return own.rollout(
                 policies, starts, goals, policy_index=policy_index, record=record, shift=shift
             )
         q, goal = self.world.check_scenarios(starts, goals)
@@ -236,6 +238,24 @@ class Simulator(EpisodeRunner):
         rollouts = Rollouts.from_episodes(q, self._run(session), copy=True)
         self._idle[:] = [session]
         return rollouts
+
+    def _own_of(self, policies: object) -> "Simulator":
+        """The simulator that policies act in: with their own observation and shield, if any."""
+        several, own = policies if isinstance(policies, Sequence) else (policies,), self
+        seen = [getattr(each, "observation", self.problem.observation) for each in several]
+        if any(each != seen[0] for each in seen):
+            raise InvalidInputError("policies of one rollout must all see the same")
+        if seen and seen[0] != self.problem.observation:
+            own = own.seen_as(seen[0])
+        n_shielded = sum(getattr(each, "shield", False) for each in several)
+        if n_shielded and not self.problem.stepping.shield:
+            if n_shielded < len(several):
+                raise InvalidInputError(
+                    "policies of one rollout must all act behind a shield or none, got "
+                    f"{n_shielded} of {len(several)}"
+                )
+            own = own.shielded()
+        return own
 
     def rollout_actions(
         self,

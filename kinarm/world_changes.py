@@ -16,6 +16,8 @@ from kinarm.episode_scenes import drawn_rows
 from kinarm.episodes import Rules
 from kinarm.errors import finite_array
 from kinarm.kernels.compiling import Array
+from kinarm.observation_choice import Observation
+from kinarm.observation_layout import ObservationLayout
 from kinarm.plant import PlantLike
 from kinarm.problem import ReachProblem
 from kinarm.scene_draws import SceneDraws
@@ -73,6 +75,14 @@ class WorldChanges:
         commanded = int(other.problem.plant.feedback == "commanded")
         other.rules = self.rules._replace(commanded=commanded)
         other.plants = EpisodePlants(other.problem, other.rules.step_limit)
+        return other
+
+    def seen_as(self, observation: Observation) -> Self:
+        """The same world with another observation; ProblemError if it cannot have it."""
+        other = copy(self)
+        other.problem = self.problem.replace(observation=observation)
+        layout = ObservationLayout.of(other.problem, self.arm)
+        other.rules = self.rules._replace(shown=layout.shown, width=layout.width)
         return other
 
     def in_scene(self, start: ArrayLike, goal: ArrayLike) -> Self:

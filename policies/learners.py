@@ -6,7 +6,7 @@ packages are found by name in the entry-point group ``kinarm.learners``, or as `
 
 import sys
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cache
 from importlib import import_module
 from importlib.metadata import entry_points
@@ -255,5 +255,9 @@ def training_states(
 
 
 def state_policy(config: TrainingConfig, state: TrainingState) -> "Policy":
-    """Freeze a state of a training into a policy."""
-    return find_learner(config.learner).policy(config, state)
+    """Freeze a state of a training into a policy, which keeps the shield that it learnt behind."""
+    policy = find_learner(config.learner).policy(config, state)
+    if not config.problem.stepping.shield:
+        return policy
+    made = replace(policy.provenance, problem=policy.problem.replace(shield=False))
+    return replace(policy, provenance=made, shield=True)

@@ -15,6 +15,7 @@ from kinarm.arm import Arm
 from kinarm.errors import InvalidInputError, PolicyFileError, finite_array
 from kinarm.networks import ACTIVATIONS, Activation, Mirror, Networks, checked_activations
 from kinarm.networks import Layer as Layer
+from kinarm.observation_choice import Observation
 from kinarm.observation_layout import ObservationLayout, observation_layout
 from kinarm.policies.normalizer import fold_normalizer, input_scale
 from kinarm.policies.provenance import Provenance
@@ -102,6 +103,11 @@ class Policy:
     def problem(self) -> ReachProblem:
         """The problem that it was made for."""
         return self.provenance.problem
+
+    @property
+    def observation(self) -> Observation:
+        """What it sees."""
+        return self.problem.observation
 
     @property
     def n_observations(self) -> int:

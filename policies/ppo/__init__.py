@@ -71,10 +71,11 @@ class PPOConfig(TrainingConfig):
     initial_tolerance : float, optional
         Training tolerance until start spread and discount are final; then it
         changes geometrically [m].
-    stop_at_goal : bool
-        Whether success in the training takes two steps in a row within the
-        tolerance, so that the hand stops at the goal. At the last step, one is
-        enough.
+    training_hold : int, optional
+        Steps in a row within the tolerance that a success in the training takes;
+        by default the task's.
+    training_speed : float, optional
+        Largest speed of the tool in those steps [m/s]; by default the task's.
     symmetric : bool
         Whether the policy treats mirror images alike, if arm and obstacles are
         symmetric; it then learns from goals on the right and mirror images of
@@ -124,7 +125,8 @@ class PPOConfig(TrainingConfig):
     final_log_std: float | None = field(default=None, metadata=OPTIONAL)
     training_tolerance: float | None = field(default=None, metadata=POSITIVE)
     initial_tolerance: float | None = field(default=None, metadata={**POSITIVE, **OPTIONAL})
-    stop_at_goal: bool = field(default=False, metadata=OPTIONAL)
+    training_hold: int | None = field(default=None, metadata={**MANY, **OPTIONAL})
+    training_speed: float | None = field(default=None, metadata={**POSITIVE, **OPTIONAL})
     symmetric: bool = False
     initial_start_spread: float = field(default=1.0, metadata=SHARE)
     initial_gamma: float | None = field(default=None, metadata=SHARE)
@@ -142,6 +144,8 @@ class PPOConfig(TrainingConfig):
     DEFAULTS: ClassVar = {
         "final_log_std": "none, it is learnt",
         "training_tolerance": "the task's",
+        "training_hold": "the task's",
+        "training_speed": "the task's",
         "initial_tolerance": "the training tolerance",
         "initial_gamma": "gamma",
         "replay_log_std": "none, noise as in others",
@@ -157,8 +161,6 @@ class PPOConfig(TrainingConfig):
             raise InvalidInputError("replay_log_std needs a replay_share above 0")
         if self.replay_noise_steps is not None and self.replay_log_std is None:
             raise InvalidInputError("replay_noise_steps needs a replay_log_std")
-        if self.stop_at_goal and not self.problem.task.goal.plain:
-            raise InvalidInputError("stop_at_goal is for standing points: give goals a hold of 2")
         if self.batch_size == 1 or self.steps_per_iteration % self.batch_size:
             raise InvalidInputError(
                 f"batch_size must be above 1 and divide the {self.steps_per_iteration} steps of a "
@@ -177,8 +179,12 @@ class PPOConfig(TrainingConfig):
 
     @property
     def training_problem(self) -> ReachProblem:
-        """The problem with the reward and tolerance of these settings."""
-        return self.problem.replace(reward=self.reward, tolerance=self.training_tolerance)
+        """The problem with the reward, the tolerance and the stop of these settings."""
+        stop = {"hold": self.training_hold, "speed": self.training_speed}
+        goal = {name: value for name, value in stop.items() if value is not None}
+        return self.problem.replace(
+            reward=self.reward, tolerance=self.training_tolerance, goal=goal or None
+        )
 
     @property
     def can_extend(self) -> bool:

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kinarm.failed_scenarios import StartsAndGoals
-from kinarm.kernels.reward import COLLISION, SUCCESS
+from kinarm.kernels.reward import COLLISION
 from kinarm.policies.mirror import problem_mirror
 from kinarm.policies.normalizer import input_scale
 from kinarm.policies.ppo import EpisodeStates, PPOConfig, PPOState
@@ -19,8 +19,7 @@ class TrainingArms:
     """Arms stepped together, whose episodes are replaced when they end.
 
     With a mirror, new goals on the left are reflected, so that a learner only
-    meets those on the right. To stop at the goal, a success takes two steps in
-    a row within the tolerance.
+    meets those on the right.
 
     Attributes
     ----------
@@ -98,19 +97,11 @@ class TrainingArms:
 
         Returns rewards, and which episodes ended, shape (n_envs,) each.
         """
-        began, episodes, task = time.perf_counter(), self.episodes, self.simulator.task
-        passes = np.zeros(len(episodes.steps), dtype=bool)
-        if self.config.stop_at_goal:
-            outside = episodes.distance > task.tolerance
-            passes = outside & (episodes.steps + 1 < task.horizon)
+        began, episodes = time.perf_counter(), self.episodes
         result = self.simulator.step(episodes, actions)
-        passes &= result.success
-        episodes.resume(passes.nonzero()[0], task.horizon)
-        remitted = self._remitted * result.terms[:, COLLISION]
-        remitted += np.where(passes, result.terms[:, SUCCESS], 0.0)
-        rewards = result.reward - remitted
+        rewards = result.reward - self._remitted * result.terms[:, COLLISION]
         self._total += rewards
-        ended = result.truncated | (result.terminated & ~passes)
+        ended = result.truncated | result.terminated
         self.cut_short.append(np.flatnonzero(result.truncated & ~result.terminated))
         self.finals.append(self._normalized(episodes.observation[self.cut_short[-1]]))
         if ended.any():

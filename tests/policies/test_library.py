@@ -71,7 +71,7 @@ def test_every_shipped_policy_loads_and_fits_its_arm(shipped_arms):
         made = policy.provenance
         policy.check_arm(shipped_arms[made.problem.arm.name])
         shipped = PROBLEMS[made.problem.name]
-        assert made.problem.tested_as(shipped).first_difference(shipped) is None
+        assert made.problem.faced_as(shipped).first_difference(shipped) is None
         assert made.problem.arm.digest == shipped.arm_digest
         assert name == f"{made.algorithm}-{made.recipe}-{made.problem.name}-seed{made.seed}"
 

@@ -97,14 +97,17 @@ class TestFile:
 
 
 class TestEvaluation:
-    def test_a_policy_faces_problems_of_its_list(self, policy):
-        assert len(evaluate(policy, trials=4).trials) == 4
-        with pytest.raises(PolicyFileError, match="sees other observations, '1: joint_angles 2n"):
-            evaluate(policy, "both", trials=4)
+    def test_a_policy_sees_its_list_in_any_problem(self, policy):
+        own = evaluate(policy, trials=4)
+        other = evaluate(policy, "both", trials=4)
+        assert (own.rollouts.configurations == other.rollouts.configurations).all()
 
-    def test_shipped_policies_face_no_other_list(self):
-        with pytest.raises(PolicyFileError, match="position 3n', than problem 'both' shows, '1: g"):
-            evaluate(load_policy("ars-tuned-both"), "both", observation=["goal"], trials=4)
+    def test_a_policy_keeps_to_its_kind_of_goals(self, policy):
+        seen = ["joint_angles", "goal_rotation"]
+        turned = ReachProblem.load("both").replace(goal={"kind": "pose"}, observation=seen)
+        made = replace(policy.provenance, problem=turned)
+        with pytest.raises(Exception, match="cannot have 'goal_rotation'"):
+            evaluate(replace(policy, provenance=made), "both", trials=4)
 
 
 def test_a_training_with_another_list_improves():

@@ -252,19 +252,13 @@ def drive(arms, steps=200):
     return [np.array(column) for column in zip(*history, strict=True)]
 
 
-class TestStopAtGoal:
-    def test_success_takes_two_steps_within_or_the_last(self, begun):
-        arms, _ = begun(stop_at_goal=True, tolerance=0.9, horizon=4)
-        distances, steps, rewards, ended = drive(arms)
-        reached, within, last = rewards > 1, distances <= 0.9, steps == 3
-        assert reached.sum() == np.concatenate(arms.successes).sum()
-        assert ended[reached].all()
-        assert (within | last)[reached].all()
-        assert reached[within & ~last].any()
-        assert reached[~within & last].any()
-
-    def test_only_a_success_has_its_bonus(self, begun):
-        distances, _, rewards, ended = drive(begun(stop_at_goal=True, tolerance=0.9, horizon=4)[0])
-        passing = (distances[:-1] > 0.9) & (distances[1:] <= 0.9) & ~ended[:-1]
-        assert passing.any()
-        assert (rewards[:-1][passing] < 1).all()
+def test_success_takes_two_steps_within_the_tolerance(begun):
+    arms, _ = begun(training_hold=2, tolerance=0.9, horizon=4)
+    distances, _, rewards, ended = drive(arms)
+    reached, within = rewards > 1, distances <= 0.9
+    assert reached.sum() == np.concatenate(arms.successes).sum() > 0
+    assert ended[reached].all()
+    assert within[reached].all()
+    passing = ~within[:-1] & within[1:] & ~ended[:-1]
+    assert passing.any()
+    assert not reached[:-1][passing].any()

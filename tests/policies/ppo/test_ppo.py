@@ -38,7 +38,7 @@ CONFIGS = {
     "symmetric": replace(TINY, symmetric=True),
     "replay": replace(TINY, replay_share=0.5, replay_size=10),
     "settling": replace(TINY, initial_tolerance=0.9, training_tolerance=0.2, final_log_std=-4.0),
-    "stopping": replace(TINY, training_tolerance=0.9, stop_at_goal=True),
+    "stopping": replace(TINY, training_tolerance=0.9, training_hold=2),
     "plant": replace(
         TINY, problem=ReachProblem.load("left").replace(plant="hard"), training_tolerance=0.3
     ),
