@@ -69,17 +69,17 @@ class Oracle:
     ----------
     problem : ReachProblem, str or Path
         The problem, its name or its file; rewards do not matter. Its plant is
-        taken for ideal, which reaches goals soonest.
+        taken for ideal, which reaches goals soonest, and motions need no shield.
     threads : int, optional
         Threads to use; by default as many as available processors.
     """
 
     def __init__(self, problem: ProblemLike, *, threads: int | None = None) -> None:
-        self.simulator = Simulator(problem, threads=threads).with_plant(Plant())
+        self.simulator = Simulator(problem, threads=threads).with_plant(Plant()).shielded(False)
         self._single, goal = self.simulator, self.simulator.task.goal
         if goal.sequence > 1:
             first = self.simulator.problem.replace(goal=replace(goal, sequence=1))
-            self._single = Simulator(first, threads=threads)
+            self._single = Simulator(first, threads=threads).shielded(False)
         self._prover = Prover(self._single.without_moving_bodies())
 
     def __repr__(self) -> str:
