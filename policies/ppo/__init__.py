@@ -87,6 +87,9 @@ class PPOConfig(TrainingConfig):
     initial_penalty : float
         Share of the penalty for contact that counts at first; it grows linearly
         to the whole.
+    intervention_penalty : float
+        Taken from the reward of a step that a shield replaces; without it, a
+        policy learns to lean on its shield.
     widening : float
         Share of the training in which spread and discount change linearly.
     replay_share : float
@@ -131,6 +134,7 @@ class PPOConfig(TrainingConfig):
     initial_start_spread: float = field(default=1.0, metadata=SHARE)
     initial_gamma: float | None = field(default=None, metadata=SHARE)
     initial_penalty: float = field(default=1.0, metadata=SHARE)
+    intervention_penalty: float = field(default=0.0, metadata={**NOT_NEGATIVE, **OPTIONAL})
     widening: float = field(default=0.0, metadata=SHARE)
     replay_share: float = field(default=0.0, metadata={**SHARE, **OPTIONAL})
     replay_size: int = field(default=8192, metadata={"at_most": LARGEST_REPLAY, **OPTIONAL})

@@ -98,8 +98,11 @@ class TrainingArms:
         Returns rewards, and which episodes ended, shape (n_envs,) each.
         """
         began, episodes = time.perf_counter(), self.episodes
+        replaced = episodes.interventions.copy()
         result = self.simulator.step(episodes, actions)
         rewards = result.reward - self._remitted * result.terms[:, COLLISION]
+        if len(replaced):
+            rewards -= self.config.intervention_penalty * (episodes.interventions - replaced)
         self._total += rewards
         ended = result.truncated | result.terminated
         self.cut_short.append(np.flatnonzero(result.truncated & ~result.terminated))
