@@ -1,8 +1,9 @@
 """What goals mean for an arm: where they lie, and which configurations reach them."""
 
 import math
+from copy import copy
 from functools import cached_property
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 import pinocchio as pin
@@ -11,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from kinarm.bodies import rotation_matrix, rotation_of_quaternion
 from kinarm.chain import within_limits
 from kinarm.collision import ContactModel
-from kinarm.episodes import Pursuit
+from kinarm.episodes import Pursuit, Rules
 from kinarm.errors import LARGEST, InvalidInputError, ProblemError, finite_array
 from kinarm.goals import Cone, Goals, quaternion_between, unit
 from kinarm.inverse_kinematics import InverseKinematics, approach_axis
@@ -45,6 +46,7 @@ class GoalKinematics(InverseKinematics):
 
     problem: ReachProblem
     contact_model: ContactModel
+    rules: Rules
 
     def checked(self, what: str, listed: tuple[tuple[float, ...], ...]) -> Array:
         """Listed configurations, shape (n, n_joints), if all are possible [rad or m]."""
@@ -58,8 +60,7 @@ class GoalKinematics(InverseKinematics):
                 raise ProblemError(f"{name} is in contact: {pair[0]} touches {pair[1]}")
         return configurations
 
-    @cached_property
-    def goal_rules(self) -> Any:
+    def _goal_rules(self) -> Any:
         """Record of what is to be reached, and how; see ``kinarm.kernels.goals``."""
         task, dt = self.problem.task, self.problem.stepping.time_step
         goal, times = task.goal, np.arange(task.horizon + 1, dtype=np.float64) * dt
@@ -77,6 +78,19 @@ class GoalKinematics(InverseKinematics):
         )
         return recorded(rules)
 
+    def with_tolerance(self, tolerance: float, rotation_tolerance: float | None = None) -> Self:
+        """The same world with another tolerance [m], and perhaps of rotations; it shares all else.
+
+        See `kinarm.GoalSpecification` for that of rotations.
+        """
+        other, goal = copy(self), None
+        if rotation_tolerance is not None:
+            goal = {"rotation_tolerance": rotation_tolerance}
+        other.problem = self.problem.replace(tolerance=tolerance, goal=goal)
+        goal_rules = other._goal_rules() if goal else self.rules.goal
+        other.rules = self.rules._replace(tolerance=float(tolerance), goal=goal_rules)
+        return other
+
     @cached_property
     def goal_width(self) -> int:
         """Length of a goal."""
@@ -87,7 +101,7 @@ class GoalKinematics(InverseKinematics):
         """Lowest and highest positions of goals, shape (3,) each [m]."""
         if self.problem.task.goal.configurations:
             return self.goals.lower.min(axis=0), self.goals.lower.max(axis=0)
-        scene, moves = self.problem.scene, self.goal_rules.moves
+        scene, moves = self.problem.scene, self.rules.goal.moves
         regions = [scene.goal_region(name) for name in self.problem.task.goal_regions]
         lower = np.min([region.lower for region in regions], axis=0)
         upper = np.max([region.upper for region in regions], axis=0)
@@ -194,7 +208,7 @@ class GoalKinematics(InverseKinematics):
         """What the tool reaches at configurations, as goals are, shape (n, goal_width)."""
         q = finite_array("configurations", configurations, (None, self.arm.n_joints))
         rows, poses = np.empty((len(q), self.goal_width)), np.empty((q.shape[1] + 1, POSE))
-        fill_reached(recorded(self.arm.chain), self.goal_rules, q, poses, rows)
+        fill_reached(recorded(self.arm.chain), self.rules.goal, q, poses, rows)
         return rows
 
     def screened(self, q: Array, scenes: Array | None = None) -> tuple[Array, NDArray[np.bool_]]:

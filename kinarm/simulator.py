@@ -83,10 +83,12 @@ class Simulator(EpisodeRunner):
         """Largest move of each actuated joint, shape (n_actions,) [rad or m]."""
         return self.world.rules.step_limit.copy()
 
-    def with_tolerance(self, tolerance: float) -> "Simulator":
-        """Another simulator of the same world with another tolerance [m]."""
+    def with_tolerance(
+        self, tolerance: float, rotation_tolerance: float | None = None
+    ) -> "Simulator":
+        """Another simulator of the same world with other tolerances [m, and rad or m]."""
         other = copy(self)
-        other.world = self.world.with_tolerance(tolerance)
+        other.world = self.world.with_tolerance(tolerance, rotation_tolerance)
         return other
 
     def in_scene(self, start: ArrayLike, goal: ArrayLike) -> "Simulator":

@@ -84,7 +84,7 @@ class World(GoalKinematics, StepContact, WorldChanges):
             shown=self.layout.shown,
             width=self.layout.width,
             boxes=unit_boxes(self.problem.scene.bodies),
-            goal=self.goal_rules,
+            goal=self._goal_rules(),
             shield=shield_table(self.arm.n_actuated if stepping.shield else 0),
         )
         self.plants = EpisodePlants(self.problem, self.rules.step_limit)

@@ -54,13 +54,6 @@ class WorldChanges:
         drawn = self.problem.scene, self._draws, self.arm.chain
         return drawn_rows(*drawn, starts, np.ascontiguousarray(goals[:, :3]), self.threads)
 
-    def with_tolerance(self, tolerance: float) -> Self:
-        """The same world with another tolerance [m]; it shares all else."""
-        other = copy(self)
-        other.problem = self.problem.replace(tolerance=tolerance)
-        other.rules = self.rules._replace(tolerance=float(tolerance))
-        return other
-
     def shielded(self, shield: bool = True) -> Self:
         """The same world with or without a shield."""
         other = copy(self)

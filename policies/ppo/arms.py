@@ -41,9 +41,16 @@ class TrainingArms:
         self.mirror = problem_mirror(config.problem) if config.symmetric else None
 
     def reach_within(self, tolerance: float) -> None:
-        """Count this distance [m] as a success in episodes restored later."""
-        if tolerance != self.simulator.task.tolerance:
-            self.simulator = self.simulator.with_tolerance(tolerance)
+        """Count this distance [m] as a success in episodes restored later.
+
+        The tolerance of rotations is as many times the task's.
+        """
+        if tolerance == self.simulator.task.tolerance:
+            return
+        task, turn = self.config.training_problem.task, None
+        if task.goal.number:
+            turn = round(task.goal.rotation_tolerance * tolerance / task.tolerance, 9)
+        self.simulator = self.simulator.with_tolerance(tolerance, turn)
 
     def sample(
         self, rng: np.random.Generator, count: int, start_spread: float | None = None
