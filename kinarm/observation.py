@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from kinarm.errors import LARGEST
-from kinarm.goals import REST_PARTS
+from kinarm.goals import REST_PARTS, finer
 from kinarm.kernels.compiling import Array, inlined
 from kinarm.kernels.elementary import sine_cosine
 from kinarm.kernels.goals import nearer_sign, write_reached
@@ -29,7 +29,7 @@ VERSION = 1
 
 
 FINE = 0.02
-"""Length of an offset that its fine part shows as one half [m]."""
+"""Error that a fine part shows as one half [m, rad or of quaternions]."""
 
 
 @inlined
@@ -58,16 +58,21 @@ def _write_offset(session: Session, seen: Seen, start: int, count: int) -> None:
 
 @inlined
 def _write_fine_offset(session: Session, seen: Seen, start: int, count: int) -> None:
-    """Goal minus tool point, over its length plus `FINE`."""
-    x, y, z = (
-        seen.goal[0, 0] - seen.tool[0],
-        seen.goal[0, 1] - seen.tool[1],
-        seen.goal[0, 2] - seen.tool[2],
-    )
-    scale = 1.0 / (math.sqrt(x * x + y * y + z * z) + FINE)
-    session.block.observation[0, start] = scale * x
-    session.block.observation[0, start + 1] = scale * y
-    session.block.observation[0, start + 2] = scale * z
+    """The same over its length plus `FINE`."""
+    _write_offset(session, seen, start, count)
+    _refine(session, start, 3)
+
+
+@inlined
+def _refine(session: Session, start: int, n: int) -> None:
+    """Divide n entries by their length plus `FINE`, so that small ones show."""
+    observation = session.block.observation
+    squares = 0.0 * observation[0, start]
+    for i in range(n):
+        squares += observation[0, start + i] * observation[0, start + i]
+    scale = 1.0 / (math.sqrt(squares) + FINE)
+    for i in range(n):
+        observation[0, start + i] *= scale
 
 
 @inlined
@@ -157,20 +162,9 @@ def _write_rest_error(session: Session, seen: Seen, start: int, count: int) -> N
 
 @inlined
 def _write_fine_rest_error(session: Session, seen: Seen, start: int, count: int) -> None:
-    """The same, over its length plus `FINE`."""
-    goal, block = session.rules.goal, session.block
-    if block.turn.shape[0] > 0:
-        reached = block.seen_reached
-        write_reached(goal, seen.tool, seen.frames, seen.joints, reached, 0)
-        sign = nearer_sign(goal.kind, reached, 0, seen.goal, 0)
-        squares = 0.0 * seen.tool[0]
-        for i in range(3, block.goal.shape[1]):
-            missing = seen.goal[0, i] - sign * reached[0, i]
-            squares += missing * missing
-        scale = 1.0 / (math.sqrt(squares) + FINE)
-        for i in range(3, block.goal.shape[1]):
-            missing = seen.goal[0, i] - sign * reached[0, i]
-            block.observation[0, start + i - 3] = scale * missing
+    """The same over its length plus `FINE`."""
+    _write_rest_error(session, seen, start, count)
+    _refine(session, start, session.block.goal.shape[1] - 3)
 
 
 def _slides(arm: "Arm", _: Scene) -> str:
@@ -197,21 +191,33 @@ UNIT = 1 + 1e-6
 def _rest_parts(
     kind: str, meaning: str, signs: tuple[int, ...], of: str = ONCE, unit: str = "1"
 ) -> Iterator[Part]:
-    """The rest of a kind of goals, and its error."""
-    for error, name in enumerate(REST_PARTS[kind]):
+    """The rest of a kind of goals, its error, and that over its length plus `FINE`."""
+    rest, missing = REST_PARTS[kind]
+    writers = {
+        rest: _write_rest,
+        missing: _write_rest_error,
+        finer(missing): _write_fine_rest_error,
+    }
+    for number, (name, write) in enumerate(writers.items()):
+        error, fine = number > 0, number > 1
 
-        def bounds(ranges: Ranges, error: int = error) -> tuple[Array | float, Array | float]:
+        def bounds(
+            ranges: Ranges, error: bool = error, fine: bool = fine
+        ) -> tuple[Array | float, Array | float]:
+            if fine:
+                return -UNIT, UNIT
             lower, upper = (ranges.lower, ranges.upper) if of == JOINTS else (-UNIT, UNIT)
             return (lower - upper, upper - lower) if error else (lower, upper)
 
         less = " of the goal less that of the tool (the nearer of two quaternions)"
+        finely = f", over the length of all plus {FINE:g}"
         yield Part(
             name=name,
-            meaning=meaning + (less if error else " of the goal"),
-            unit=unit,
+            meaning=meaning + (less if error else " of the goal") + (finely if fine else ""),
+            unit="1" if fine else unit,
             signs=signs,
             bounds=bounds,
-            write=_write_rest_error if error else _write_rest,
+            write=write,
             of=of,
             of_goal=True,
         )
@@ -237,7 +243,7 @@ OBSERVATION = (
         of_goal=True,
     ),
     Part(
-        name="fine_goal_minus_tool",
+        name=finer("goal_minus_tool"),
         meaning=f"goal minus tool point x, y, z, over its length plus {FINE:g} m",
         unit="1",
         signs=POLAR,
@@ -348,15 +354,6 @@ OBSERVATION = (
     ),
     *_rest_parts("direction", "direction x, y, z", POLAR),
     *_rest_parts("pose", "quaternion w, x, y, z", (1, -1, 1, -1)),
-    Part(
-        name="fine_rotation_error",
-        meaning="rotation error, over its length plus",
-        unit="1",
-        signs=(1, -1, 1, -1),
-        bounds=lambda _: (-UNIT, UNIT),
-        write=_write_fine_rest_error,
-        of_goal=True,
-    ),
     *_rest_parts("configuration", "position of each joint", (0,), of=JOINTS, unit="rad or m"),
 )
 """The parts in order; those per joint go through all joints in turn."""

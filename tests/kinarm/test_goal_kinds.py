@@ -7,7 +7,9 @@ import numpy as np
 import pytest
 
 from kinarm.errors import KinarmError
+from kinarm.goals import REST_ERRORS, finer
 from kinarm.kernels.elementary import angle_of
+from kinarm.observation_choice import Observation
 from kinarm.problem import ReachProblem
 from kinarm.reference import ReferenceSimulator
 from kinarm.scenarios import draw_followers
@@ -82,7 +84,10 @@ def test_the_reference_agrees(goal):
 @pytest.mark.parametrize("kind", KINDS)
 def test_the_reference_agrees_with_a_plant(kind):
     # Policies see what is measured, and are judged by what is.
-    compare_with_reference(simulator_of({**KINDS[kind], "sequence": 2}, plant="ur", tolerance=0.1))
+    seen = Observation().names(kind)
+    fine = [finer(name) for name in seen if name in ("goal_minus_tool", *REST_ERRORS)]
+    settings = {"plant": "ur", "tolerance": 0.1, "observation": [*seen, *fine]}
+    compare_with_reference(simulator_of({**KINDS[kind], "sequence": 2}, **settings))
 
 
 def compare_with_reference(simulator):

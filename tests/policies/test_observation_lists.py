@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 
 from kinarm import ReachProblem, Simulator
-from kinarm.errors import PolicyFileError
 from kinarm.evaluation import evaluate
-from kinarm.policies import ARSConfig, Policy, load_policy, train_policy
+from kinarm.policies import ARSConfig, Policy, train_policy
 from kinarm.policies.mirror import find_mirror, missing_mirror
 from kinarm.policies.policy import Layer
 from kinarm.policies.provenance import Provenance
