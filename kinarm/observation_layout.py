@@ -17,6 +17,9 @@ from kinarm.problem import ReachProblem
 GOAL_KEYS = ("observation", "achieved_goal", "desired_goal")
 """Entries of a dictionary observation; the achieved goal is what the tool has reached."""
 
+WITH_MEMORY = {"joint_velocities", "last_action", "time_left"}
+"""Parts that tell of earlier steps."""
+
 
 class ObservationLayout(NamedTuple):
     """Where the parts of a problem's observation are.
@@ -124,6 +127,11 @@ class ObservationLayout(NamedTuple):
         flat = np.empty((*batch, self.size))
         flat[..., goals], flat[..., offsets], flat[..., entries] = goal, goal - tool, rest
         return flat
+
+    @property
+    def remembers(self) -> bool:
+        """Whether it tells of earlier steps."""
+        return self.history > 1 or not WITH_MEMORY.isdisjoint(self.places)
 
     @property
     def sees_bodies(self) -> bool:

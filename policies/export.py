@@ -23,9 +23,6 @@ from kinarm.policies.conversion.to_torch import command_module, onnx_model
 from kinarm.policies.policy import FORMAT_VERSION, Policy, policy_content
 from kinarm.world import World
 
-WITH_MEMORY = {"joint_velocities", "last_action", "time_left"}
-"""Parts of an observation that depend on more than joint positions, command and goal."""
-
 REACHED = ("rotation_tolerance", "hold", "speed")
 """When a goal counts as reached, beside the tolerance of its position."""
 
@@ -155,7 +152,7 @@ def contract_of(
         {"name": part.name, "length": layout.length(part), "unit": part.unit, "is": part.meaning}
         for part in layout.parts
     ]
-    memory = layout.history > 1 or not WITH_MEMORY.isdisjoint(layout.places)
+    memory = layout.remembers
     kind, side = task.goal.kind, None if policy.mirror is None else policy.mirror.side
     meant = {"kind": kind, "is": GOALS[kind], "length": world.goal_width}
     meant["tolerance"] = task.tolerance

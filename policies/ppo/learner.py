@@ -28,6 +28,9 @@ IMITATING = "learning from the oracle's motions first"
 NORMALIZED_OVER = 10_000
 """Random starts whose observations the normaliser describes."""
 
+RANDOM_STEPS = 8
+"""Random steps before observations that tell of earlier ones."""
+
 
 def seed_iteration(seed: int, iteration: int) -> tuple[np.random.Generator, np.random.Generator]:
     """Give an iteration random numbers of its own, so that trainings can resume.
@@ -63,7 +66,7 @@ class PPOTraining:
         """State before the first iteration; the normaliser has seen random starts."""
         config, arms = self.config, self.arms
         rng, scenarios = seed_iteration(config.seed, 0)
-        seen = arms.simulator.world.observe(*arms.sample(scenarios, NORMALIZED_OVER))
+        seen = self._seen(scenarios)
         starts, goals = arms.sample(scenarios, config.n_envs, config.start_spread_at(0.0))
         parameters = initial_parameters(rng, self._widths, config.log_std_init)
         normalizer = Normalizer.of(seen)
@@ -85,6 +88,16 @@ class PPOTraining:
             return state
         with doing(IMITATING):
             return replace(state, parameters=self._taught(state))
+
+    def _seen(self, rng: np.random.Generator) -> NDArray[np.float64]:
+        """Observations of random starts; if they tell of earlier steps, after some at random."""
+        simulator, scenarios = self.arms.simulator, self.arms.sample(rng, NORMALIZED_OVER)
+        if not simulator.world.layout.remembers:
+            return simulator.world.observe(*scenarios)
+        episodes = simulator.reset(*scenarios)
+        for _ in range(RANDOM_STEPS):
+            simulator.step(episodes, rng.uniform(-1, 1, (NORMALIZED_OVER, simulator.n_actions)))
+        return episodes.observation
 
     def _taught(self, state: PPOState) -> NDArray[np.float32]:
         """Parameters of an actor that has imitated the oracle."""

@@ -10,7 +10,7 @@ from kinarm.chain import within_limits
 from kinarm.episodes import COLLISION, RUNNING, SUCCESS, Episodes, Outcome
 from kinarm.errors import InvalidInputError, ProblemError, RunStoppedError
 from kinarm.kernels.compiling import Array
-from kinarm.policies.export import WITH_MEMORY
+from kinarm.observation_layout import WITH_MEMORY
 from kinarm.policies.policy import Policy
 from kinarm.policies.running.backend import WiredArm
 from kinarm.policies.running.watchdog import SafeLimits, Watchdog
