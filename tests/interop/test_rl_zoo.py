@@ -17,8 +17,8 @@ from kinarm.policies import zoo_hyperparameters
 
 pytestmark = pytest.mark.slow
 
-PAGE = (DOCS / "how-to" / "rl_zoo.md").read_text(encoding="utf-8")
-BLOCKS = named_blocks(DOCS / "how-to" / "rl_zoo.md")
+PAGE = (DOCS / "how-to" / "stable_baselines3.md").read_text(encoding="utf-8")
+BLOCKS = named_blocks(DOCS / "how-to" / "stable_baselines3.md")
 FLAT, GOALS = "kinarm/ReachRight-v0", "kinarm/ReachGoalRight-v0"
 SMALL = {
     "ppo": ["n_envs:4", "batch_size:64"],
