@@ -1,22 +1,20 @@
-"""What pages hold of the code and of recorded results: ``python docs/tables.py`` writes it.
+"""What pages hold of the code and of recorded results: ``python -m docs.tables`` writes it.
 
 It stands between ``<!-- table NAME -->``, ``<!-- text FILE -->`` or ``<!-- code FILE -->`` and
 ``<!-- end -->``. A test compares it with what would be written now.
 """
 
-import json
 import os
 import re
 import shlex
 import textwrap
-from collections import Counter
 from collections.abc import Mapping
 from dataclasses import fields
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
+from docs.recorded_tables import RECORDED
 from kinarm import PROBLEMS, REWARD_TERMS, Arm, Plant, RewardWeights, Scene, Simulator, plant_names
 from kinarm.__main__ import COMMANDS
 from kinarm._fields import init_fields, summary_of, to_plain
@@ -36,8 +34,6 @@ from kinarm.policies import find_learner
 DOCS = Path(__file__).parent
 RESULTS = DOCS.parent / "data" / "results"
 
-MANNERS = ("bare", "commanded", "shield", "both", "both, lag known", "quarter of the speed")
-"""Columns of the table of transfer to MuJoCo."""
 
 SYMBOLS = {
     "n": "number of trials; of several training seeds, all their trials together",
@@ -256,140 +252,9 @@ def plants_table() -> str:
     return markdown_table(["plant", "settings"], rows)
 
 
-def servos_table() -> str:
-    """Success and contact of policies in kinarm and in MuJoCo, in percent, by plant."""
-    record = json.loads((RESULTS / "plants" / "mujoco.json").read_text(encoding="utf-8"))
-    names = list(record["rows"][0]["policies"])
-
-    def shares(figures: Mapping[str, list[float]]) -> str:
-        pairs = (figures[each] for each in ("kinarm", "mujoco"))
-        return ", ".join(f"{100 * success:.1f} / {100 * touched:.1f}" for success, touched in pairs)
-
-    rows = [
-        [
-            row["plant"],
-            f"{100 * row['apart']:.2f}",
-            *(shares(row["policies"][name]) for name in names),
-        ]
-        for row in record["rows"]
-    ]
-    heads = (f"`{name.removesuffix('-both-seed0')}`" for name in names)
-    return markdown_table(["plant", "apart %", *heads], rows)
-
-
-def transfer_records() -> list[dict[str, Any]]:
-    """What was recorded of policies in MuJoCo, in the order of the pages."""
-    paths = sorted(
-        (RESULTS / "plants").glob("transfer-*.json"), key=lambda path: "-ars" in str(path)
-    )
-    return [json.loads(path.read_text(encoding="utf-8")) for path in paths]
-
-
-def transfer_table() -> str:
-    """Success and contact of policies in MuJoCo by plant and manner, in percent."""
-    rows: list[list[str]] = []
-    for record in transfer_records():
-        name = f"`{record['policy'].removesuffix('-both-seed0')}`"
-        figures: dict[str, dict[str, str]] = {}
-        for cell in record["cells"]:
-            said = f"{100 * cell['success']:.1f} / {100 * cell['contact']:.1f}"
-            figures.setdefault(cell["plant"], {})[cell["manner"]] = said
-        rows += [
-            [name, plant, *(row.get(each, "") for each in MANNERS)]
-            for plant, row in figures.items()
-        ]
-    return markdown_table(["policy", "plant", *MANNERS], rows)
-
-
-def transfer_trials() -> str:
-    """How many trials the cells of that table have."""
-    counts = Counter(cell["trials"] for each in transfer_records() for cell in each["cells"])
-    said = (f"{cells} cells have {trials} trials" for trials, cells in sorted(counts.items()))
-    return f"{', '.join(said)}.\n"
-
-
-def shield_table() -> str:
-    """Random steps behind a shield."""
-    record = json.loads((RESULTS / "plants" / "shield.json").read_text(encoding="utf-8"))
-    rows = [
-        [
-            row["what"],
-            f"{row['steps']:,}",
-            f"{100 * row['replaced'] / row['steps']:.1f}",
-            f"{row['contacts']}",
-            f"{row['steps_per_second_and_core']:,}",
-        ]
-        for row in record["random"]
-    ]
-    return markdown_table(["in", "steps", "replaced %", "contacts", "steps/s on a busy core"], rows)
-
-
-def pushing_text() -> str:
-    """What the steps of an arm take that pushes."""
-    record = json.loads((RESULTS / "plants" / "shield.json").read_text(encoding="utf-8"))
-    row = record["pushing"]
-    return (
-        f"A UR5 with pieces that pushes all the time: of {row['steps']:,} steps, "
-        f"{100 * row['replaced'] / row['steps']:.0f} % were replaced, and one took "
-        f"{row['median']:g} ms in the median and {row['most']:g} ms at the 99th percentile "
-        "(processor time).\n"
-    )
-
-
-def balls_table() -> str:
-    """Success and contact beside bodies that move, in percent."""
-    record = json.loads((RESULTS / "plants" / "shield.json").read_text(encoding="utf-8"))
-    rows = []
-    for row in record["balls"]:
-        shares = [[f"{100 * each:.1f}" for each in row[name]] for name in ("bare", "shield")]
-        driven = [f"{success} / {contact}" for success, contact, _ in shares]
-        rows.append([f"{row['speed']:g} m/s", *driven, *(each[2] for each in shares)])
-    head = ["speed of the balls", "`ppo-best`", "behind a shield", "resting", "behind a shield"]
-    return markdown_table(head, rows)
-
-
-def injections_table() -> str:
-    """Errors of arms that the check of a contract was given, and how many it missed, by kind."""
-    record = json.loads((RESULTS / "contract" / "injections.json").read_text(encoding="utf-8"))
-    kinds = [kind for kind in record[0]["tally"] if kind != "no error"]
-    rows = [
-        [
-            kind,
-            f"{sum(each['tally'].get(kind, 0) for each in record)}",
-            f"{sum(each['missed'].count(kind) for each in record)}",
-        ]
-        for kind in kinds
-    ]
-    clean = sum(each["tally"]["no error"] for each in record)
-    imagined = sum(len(each["imagined"]) for each in record)
-    rows.append(["no error", f"{clean}", f"{imagined} imagined"])
-    return markdown_table(["error, in", "arms", "missed"], rows)
-
-
-def plans_table() -> str:
-    """Plans for MotionBenchMaker's problems by kinarm and by OMPL, and with hulls."""
-    record = json.loads((RESULTS / "plans" / "motionbenchmaker.json").read_text(encoding="utf-8"))
-    rows = []
-    for name, of in record["pieces"].items():
-        row = [f"`{name}`"]
-        for told, part in ((of, ""), (of, "ompl "), (record["hulls"][name], "")):
-            times = " / ".join(f"{1000 * value:.0f}" for value in told[f"{part}seconds"])
-            row += [f"{told[f'{part}solved']} of {told[f'{part}solved of']}", times]
-        rows.append([*row, " / ".join(f"{value:.2f}" for value in of["ratio"])])
-    heads = ["problems", "kinarm", "ms", "OMPL", "ms", "hulls", "ms", "duration"]
-    return markdown_table(heads, rows)
-
-
 TABLES = {
-    "injections": injections_table,
-    "plans": plans_table,
+    **RECORDED,
     "plants": plants_table,
-    "servos": servos_table,
-    "transfer-mujoco": transfer_table,
-    "transfer-trials": transfer_trials,
-    "shield": shield_table,
-    "pushing": pushing_text,
-    "balls": balls_table,
     "arm": lambda: arm_table("paper"),
     "capsules": lambda: capsule_table("paper"),
     "arms": arms_table,

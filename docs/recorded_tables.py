@@ -1,0 +1,175 @@
+"""Tables of pages that come from recorded results; see ``docs.tables``."""
+
+import json
+from collections import Counter
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from kinarm.evaluation.report.templating import markdown_table
+
+RESULTS = Path(__file__).parent.parent / "data" / "results"
+
+MANNERS = ("bare", "commanded", "shield", "both", "both, lag known", "quarter of the speed")
+"""Columns of the table of transfer to MuJoCo."""
+
+
+def servos_table() -> str:
+    """Success and contact of policies in kinarm and in MuJoCo, in percent, by plant."""
+    record = json.loads((RESULTS / "plants" / "mujoco.json").read_text(encoding="utf-8"))
+    names = list(record["rows"][0]["policies"])
+
+    def shares(figures: Mapping[str, list[float]]) -> str:
+        pairs = (figures[each] for each in ("kinarm", "mujoco"))
+        return ", ".join(f"{100 * success:.1f} / {100 * touched:.1f}" for success, touched in pairs)
+
+    rows = [
+        [
+            row["plant"],
+            f"{100 * row['apart']:.2f}",
+            *(shares(row["policies"][name]) for name in names),
+        ]
+        for row in record["rows"]
+    ]
+    heads = (f"`{name.removesuffix('-both-seed0')}`" for name in names)
+    return markdown_table(["plant", "apart %", *heads], rows)
+
+
+def transfer_records() -> list[dict[str, Any]]:
+    """What was recorded of policies in MuJoCo, in the order of the pages."""
+    paths = sorted(
+        (RESULTS / "plants").glob("transfer-*.json"), key=lambda path: "-ars" in str(path)
+    )
+    return [json.loads(path.read_text(encoding="utf-8")) for path in paths]
+
+
+def transfer_table() -> str:
+    """Success and contact of policies in MuJoCo by plant and manner, in percent."""
+    rows: list[list[str]] = []
+    for record in transfer_records():
+        name = f"`{record['policy'].removesuffix('-both-seed0')}`"
+        figures: dict[str, dict[str, str]] = {}
+        for cell in record["cells"]:
+            said = f"{100 * cell['success']:.1f} / {100 * cell['contact']:.1f}"
+            figures.setdefault(cell["plant"], {})[cell["manner"]] = said
+        rows += [
+            [name, plant, *(row.get(each, "") for each in MANNERS)]
+            for plant, row in figures.items()
+        ]
+    return markdown_table(["policy", "plant", *MANNERS], rows)
+
+
+def transfer_trials() -> str:
+    """How many trials the cells of that table have."""
+    counts = Counter(cell["trials"] for each in transfer_records() for cell in each["cells"])
+    said = (f"{cells} cells have {trials} trials" for trials, cells in sorted(counts.items()))
+    return f"{', '.join(said)}.\n"
+
+
+def shield_table() -> str:
+    """Random steps behind a shield."""
+    record = json.loads((RESULTS / "plants" / "shield.json").read_text(encoding="utf-8"))
+    rows = [
+        [
+            row["what"],
+            f"{row['steps']:,}",
+            f"{100 * row['replaced'] / row['steps']:.1f}",
+            f"{row['contacts']}",
+            f"{row['steps_per_second_and_core']:,}",
+        ]
+        for row in record["random"]
+    ]
+    return markdown_table(["in", "steps", "replaced %", "contacts", "steps/s on a busy core"], rows)
+
+
+def pushing_text() -> str:
+    """What the steps of an arm take that pushes."""
+    record = json.loads((RESULTS / "plants" / "shield.json").read_text(encoding="utf-8"))
+    row = record["pushing"]
+    return (
+        f"A UR5 with pieces that pushes all the time: of {row['steps']:,} steps, "
+        f"{100 * row['replaced'] / row['steps']:.0f} % were replaced, and one took "
+        f"{row['median']:g} ms in the median and {row['most']:g} ms at the 99th percentile "
+        "(processor time).\n"
+    )
+
+
+def balls_table() -> str:
+    """Success and contact beside bodies that move, in percent."""
+    record = json.loads((RESULTS / "plants" / "shield.json").read_text(encoding="utf-8"))
+    rows = []
+    for row in record["balls"]:
+        shares = [[f"{100 * each:.1f}" for each in row[name]] for name in ("bare", "shield")]
+        driven = [f"{success} / {contact}" for success, contact, _ in shares]
+        rows.append([f"{row['speed']:g} m/s", *driven, *(each[2] for each in shares)])
+    head = ["speed of the balls", "`ppo-best`", "behind a shield", "resting", "behind a shield"]
+    return markdown_table(head, rows)
+
+
+def injections_table() -> str:
+    """Errors of arms that the check of a contract was given, and how many it missed, by kind."""
+    record = json.loads((RESULTS / "contract" / "injections.json").read_text(encoding="utf-8"))
+    kinds = [kind for kind in record[0]["tally"] if kind != "no error"]
+    rows = [
+        [
+            kind,
+            f"{sum(each['tally'].get(kind, 0) for each in record)}",
+            f"{sum(each['missed'].count(kind) for each in record)}",
+        ]
+        for kind in kinds
+    ]
+    clean = sum(each["tally"]["no error"] for each in record)
+    imagined = sum(len(each["imagined"]) for each in record)
+    rows.append(["no error", f"{clean}", f"{imagined} imagined"])
+    return markdown_table(["error, in", "arms", "missed"], rows)
+
+
+def plans_table() -> str:
+    """Plans for MotionBenchMaker's problems by kinarm and by OMPL, and with hulls."""
+    record = json.loads((RESULTS / "plans" / "motionbenchmaker.json").read_text(encoding="utf-8"))
+    rows = []
+    for name, of in record["pieces"].items():
+        row = [f"`{name}`"]
+        for told, part in ((of, ""), (of, "ompl "), (record["hulls"][name], "")):
+            times = " / ".join(f"{1000 * value:.0f}" for value in told[f"{part}seconds"])
+            row += [f"{told[f'{part}solved']} of {told[f'{part}solved of']}", times]
+        rows.append([*row, " / ".join(f"{value:.2f}" for value in of["ratio"])])
+    heads = ["problems", "kinarm", "ms", "OMPL", "ms", "hulls", "ms", "duration"]
+    return markdown_table(heads, rows)
+
+
+def factors_table() -> str:
+    """What a change of a recipe is worth, in percentage points of success."""
+    rows = []
+    for name in ("ars_factors", "teacher"):
+        record = json.loads((RESULTS / name / "learners.json").read_text(encoding="utf-8"))
+        titles = {each["name"]: each["title"] for each in record["learners"]}
+        first, *others = record["results"]
+        for row in (first, *others):
+            success, change = row["success"], row["success"]["value"] - first["success"]["value"]
+            low, high = success["ci95"]
+            rows.append(
+                [
+                    f"`{titles[first['learner']]}`",
+                    "as it is" if row is first else titles[row["learner"]],
+                    f"{100 * success['value']:.1f} ({100 * low:.1f}..{100 * high:.1f})",
+                    "" if row is first else f"{100 * change:+.1f}",
+                    f"{100 * min(row['success_each']):.1f}",
+                    f"{100 * row['collision']['value']:.1f}",
+                ]
+            )
+    heads = ["recipe", "change", "success % (95 %)", "points", "worst seed %", "collision %"]
+    return markdown_table(heads, rows)
+
+
+RECORDED = {
+    "injections": injections_table,
+    "plans": plans_table,
+    "servos": servos_table,
+    "transfer-mujoco": transfer_table,
+    "transfer-trials": transfer_trials,
+    "shield": shield_table,
+    "pushing": pushing_text,
+    "balls": balls_table,
+    "factors": factors_table,
+}
