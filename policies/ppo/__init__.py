@@ -16,8 +16,7 @@ from kinarm.policies.normalizer import Normalizer
 from kinarm.policies.recipes import shipped_learner
 from kinarm.problem import ReachProblem
 
-SETTLED = 0.9
-"""Share of a training after which noise and tolerance are final."""
+OPTIONAL_SHARE = {"must": "lie in (0, 1]", "holds": lambda value: 0 < value <= 1, **OPTIONAL}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -92,6 +91,8 @@ class PPOConfig(TrainingConfig):
         policy learns to lean on its shield.
     widening : float
         Share of the training in which spread and discount change linearly.
+    settled : float
+        Share of the training after which noise and tolerance are final.
     replay_share : float
         Probability that an episode begins where an earlier one failed; see
         `kinarm.failed_scenarios`.
@@ -136,6 +137,7 @@ class PPOConfig(TrainingConfig):
     initial_penalty: float = field(default=1.0, metadata=SHARE)
     intervention_penalty: float = field(default=0.0, metadata={**NOT_NEGATIVE, **OPTIONAL})
     widening: float = field(default=0.0, metadata=SHARE)
+    settled: float = field(default=0.9, metadata=OPTIONAL_SHARE)
     replay_share: float = field(default=0.0, metadata={**SHARE, **OPTIONAL})
     replay_size: int = field(default=8192, metadata={"at_most": LARGEST_REPLAY, **OPTIONAL})
     replay_log_std: float | None = field(default=None, metadata=OPTIONAL)
@@ -211,18 +213,18 @@ class PPOConfig(TrainingConfig):
         """Logarithm of the deviation after a share of the training, if set."""
         if self.final_log_std is None:
             return None
-        settled = min(1.0, done / SETTLED)
+        settled = min(1.0, done / self.settled)
         return (1 - settled) * self.log_std_init + settled * self.final_log_std
 
     def tolerance_at(self, done: float) -> float:
         """Distance that counts as a success after this share of the training [m]."""
         own, initial = self.training_tolerance, self.initial_tolerance
         final = self.problem.task.tolerance if own is None else own
-        if initial is None or done >= SETTLED:
+        if initial is None or done >= self.settled:
             return final
         if done <= self.widening:
             return initial
-        fallen = (done - self.widening) / (SETTLED - self.widening)
+        fallen = (done - self.widening) / (self.settled - self.widening)
         # Rounded, for powers differ between C libraries.
         return round(initial * math.pow(final / initial, fallen), 9)
 
