@@ -43,7 +43,7 @@ def ranking(names: Iterable[str], trials: int = TRIALS) -> dict[str, Any]:
         ``trials``, ``seed``; ``success`` and ``step_ratio`` of each policy by its name, by
         problem; ``best``: name of the best policy, by problem.
     """
-    contestants = [contestant for name in names for contestant in find_contestants(name)]
+    contestants = [each.bare() for name in names for each in find_contestants(name)]
     made: dict[str, Any] = {"success": {}, "step_ratio": {}, "best": {}}
     for name, problem in PROBLEMS.items():
         faced = trial_set(problem, trials, SEED)

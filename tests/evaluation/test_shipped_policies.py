@@ -20,7 +20,7 @@ ROOT = Path(__file__).parents[2]
 PAPER = [(algorithm, "paper", problem) for algorithm in ("ars", "ppo") for problem in PROBLEMS]
 OURS = [
     *(("ars", named) for named in ("tuned", "linear", "best")),
-    *(("ppo", named) for named in ("tuned", "taught", "best", "precise")),
+    *(("ppo", named) for named in ("tuned", "taught", "quick", "best", "precise")),
 ]
 SEEDS = {
     **{"-".join(group): 4 for group in PAPER},
@@ -55,9 +55,11 @@ def settings_of(config):
 
 def assert_made_by(config, made):
     """Settings that have come since it was trained had no other value then."""
-    released = settings_of(config)
-    reward = {**RECEIVED, **made.config.get("reward", asdict(made.problem.task.reward))}
-    assert {**released, **made.config, "reward": reward} == released
+    released, config = settings_of(config), dict(made.config)
+    if config.pop("stop_at_goal", False):  # a hold of two steps, but for the last step
+        config["training_hold"] = 2
+    reward = {**RECEIVED, **config.get("reward", asdict(made.problem.task.reward))}
+    assert {**released, **config, "reward": reward} == released
     assert made.commit
     assert not made.commit.endswith("-dirty"), "trained from changed sources"
 
@@ -102,7 +104,7 @@ def test_a_policy_is_what_the_released_recipe_makes_in_a_whole_training(name):
 @pytest.mark.parametrize("group", SEEDS)
 def test_a_group_is_all_its_training_seeds(group):
     names = [f"{group}-seed{n}" for n in range(SEEDS[group])]
-    assert [contestant.name for contestant in find_contestants(group)] == names
+    assert [contestant.bare().name for contestant in find_contestants(group)] == names
     weights = {load_policy(name).layers[0].weights.tobytes() for name in names}
     assert len(weights) == len(names)
 
@@ -127,6 +129,7 @@ def test_symmetric_policies_treat_mirror_images_alike():
         ("ars-best", 0.975),
         ("ppo-tuned", 0.90),
         ("ppo-taught", 0.965),
+        ("ppo-quick", 0.99),  # behind its shield
         ("ppo-best", 0.985),
         ("ppo-precise", 0.98),
     ],
