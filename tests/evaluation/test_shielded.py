@@ -5,14 +5,14 @@ import json
 import numpy as np
 import pytest
 
-from kinarm import Simulator
+from kinarm import PROBLEMS, ReachProblem, Simulator
 from kinarm._files import write_text
 from kinarm.errors import InvalidInputError
 from kinarm.evaluation import EvaluationRequest, ReplayRequest, evaluate
 from kinarm.evaluation.finding import find_contestants
 from kinarm.evaluation.replay.request import described
 from kinarm.evaluation.selection import group_names
-from kinarm.policies import Policy, load_policy
+from kinarm.policies import Policy, PPOConfig, load_policy, train_policy
 from kinarm.recording import load_recordings, record_rollouts, save_recordings
 
 NAME = "ars-linear-both-seed0"
@@ -45,6 +45,20 @@ def test_it_has_a_name_and_a_group_of_its_own(policy):
     names = group_names((*shielded, *find_contestants("ars-linear-both")))
     assert set(names.values()) == {"ars-linear-both", "ars-linear-both+shield"}
     assert shielded[0].shielded() is shielded[0]
+
+
+def test_what_learnt_behind_a_shield_keeps_it_and_is_shown_without_it_too(tmp_path):
+    problem = ReachProblem.load("both").replace(shield=True)
+    config = PPOConfig(problem=problem, iterations=1, n_envs=4, n_steps=10, batch_size=20)
+    policy = train_policy(config).policy
+    assert policy.shield
+    assert policy.problem.digest == PROBLEMS["both"].digest
+    policy.save(tmp_path / "mine.npz")
+    request = EvaluationRequest(policies=(str(tmp_path / "mine.npz"),), trials=100, oracle=False)
+    bare, safe = request.evaluate()
+    assert (bare.name, safe.name) == ("mine", "mine+shield")
+    assert bare.rollouts.interventions.shape == (0,)
+    assert not safe.rollouts.collision.any()
 
 
 def test_replaced_steps_stand_in_tables_where_there_is_a_shield():

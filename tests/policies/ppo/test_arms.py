@@ -27,9 +27,12 @@ def normalizer():
     return Normalizer.of(simulator.world.observe(*simulator.sample(np.random.default_rng(1), 500)))
 
 
-def made(*, number=NUMBER, horizon=64, tolerance=0.5, scene=None, **settings):
+def made(
+    *, number=NUMBER, horizon=64, tolerance=0.5, scene=None, shield=None, goal=None, **settings
+):
     """Arms that have not begun."""
     changes = {"tolerance": tolerance, "horizon": horizon, "scene": scene}
+    changes |= {"shield": shield, "goal": goal}
     problem = PROBLEMS["both"].replace(reward=REWARD, **changes)
     config = PPOConfig(problem=problem, n_envs=number, n_steps=100, batch_size=20, **settings)
     return TrainingArms(config)
@@ -240,6 +243,27 @@ def test_a_share_of_the_penalty(begun):
         np.testing.assert_allclose(milder, expected, rtol=0, atol=1e-6)
         touched += touching.sum()
     assert touched > 5
+
+
+def test_steps_that_a_shield_replaces_have_a_price(begun):
+    free, dear = (begun(shield=True, intervention_penalty=price)[0] for price in (0.0, 0.5))
+    replaced = 0
+    for _ in range(20):
+        before, actions = dear.episodes.interventions.copy(), np.ones((NUMBER, 5), np.float32)
+        cheap, ended = free.step(actions)
+        paid, _ = dear.step(actions)
+        more = (dear.episodes.interventions - before)[~ended]
+        np.testing.assert_allclose((cheap - paid)[~ended], 0.5 * more, rtol=0, atol=1e-6)
+        replaced += more.sum()
+    assert replaced > 0
+
+
+def test_tolerances_of_rotations_fall_with_those_of_positions():
+    arms = made(goal={"kind": "pose", "rotation_tolerance": 0.05}, tolerance=0.005)
+    arms.reach_within(0.05)
+    assert arms.simulator.task.goal.rotation_tolerance == pytest.approx(0.5)
+    assert arms.simulator.world.rules.goal.tolerance == pytest.approx(0.5)
+    assert arms.simulator.world.rules.tolerance == 0.05
 
 
 def drive(arms, steps=200):

@@ -33,15 +33,18 @@ TINY = PPOConfig(
     learning_rate_schedule="linear",
     seed=5,
 )
+LAGGING = ReachProblem.load("left").replace(
+    plant="hard", observation=["goal", "joint_angles", "joint_velocities", "last_action"]
+)
+SHIELDED = ReachProblem.load("left").replace(shield=True)
 CONFIGS = {
     "plain": TINY,
     "symmetric": replace(TINY, symmetric=True),
     "replay": replace(TINY, replay_share=0.5, replay_size=10),
     "settling": replace(TINY, initial_tolerance=0.9, training_tolerance=0.2, final_log_std=-4.0),
     "stopping": replace(TINY, training_tolerance=0.9, training_hold=2),
-    "plant": replace(
-        TINY, problem=ReachProblem.load("left").replace(plant="hard"), training_tolerance=0.3
-    ),
+    "shielded": replace(TINY, problem=SHIELDED, intervention_penalty=0.2),
+    "plant": replace(TINY, problem=LAGGING, training_tolerance=0.3),
     "right": replace(
         TINY, problem="right", reward=RewardWeights(success=1.0), training_tolerance=0.3
     ),
@@ -220,7 +223,8 @@ def predicted(training, state, observations):
 def test_policy_acts_like_the_actor(trained):
     config, _, states = trained
     training, state = PPOTraining(config), replace(states[-1], parameters=states[-1].parameters * 1)
-    actor = split_parameters(state.parameters, (48, *config.net_arch, 5)).actor
+    widths = (training.arms.simulator.n_observations, *config.net_arch, 5)
+    actor = split_parameters(state.parameters, widths).actor
     actor[-1][0][:] *= 100  # so that some actions are clipped
     policy = state_policy(config, state)
     simulator = Simulator(config.problem, threads=1)
