@@ -63,6 +63,7 @@ class Rules(NamedTuple):
     commanded: int
     shown: NDArray[np.uint32]
     width: int
+    newton: int
     boxes: Array
     goal: Any
     shield: Array

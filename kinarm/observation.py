@@ -16,6 +16,7 @@ from kinarm.kernels.compiling import Array, inlined
 from kinarm.kernels.elementary import sine_cosine
 from kinarm.kernels.goals import nearer_sign, write_reached
 from kinarm.kernels.plant import COMMAND
+from kinarm.kernels.resolved_rate import write_resolved_rate
 from kinarm.kernels.session import Session
 from kinarm.kernels.surroundings import NEAR, Seen, write_obstacles, write_proximity
 from kinarm.observation_part import ACTUATED, JOINTS, ONCE, SLOTS, Part, Ranges
@@ -249,6 +250,19 @@ OBSERVATION = (
         signs=POLAR,
         bounds=lambda _: (-UNIT, UNIT),
         write=_write_fine_offset,
+        of_goal=True,
+    ),
+    Part(
+        name="resolved_rate",
+        meaning=(
+            "action of resolved-rate control: a damped Newton step to the goal, blind to contact, "
+            "for each actuated joint, shortened as a whole to 1 at most"
+        ),
+        unit="1",
+        signs=(0,),
+        bounds=lambda _: (-UNIT, UNIT),
+        write=write_resolved_rate,
+        of=ACTUATED,
         of_goal=True,
     ),
     Part(

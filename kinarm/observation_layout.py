@@ -1,7 +1,7 @@
 """Where the parts of an observation are, for an arm."""
 
 from collections.abc import Mapping
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -83,6 +83,12 @@ class ObservationLayout(NamedTuple):
         for part, place in zip(self.parts, self.places.values(), strict=True):
             table[OBSERVATION.index(part)] = place.start, self.counts[part.of]
         return table
+
+    def rules(self, problem: ReachProblem) -> dict[str, Any]:
+        """What `kinarm.episodes.Rules` have of it."""
+        turned = problem.task.goal.kind in ("direction", "pose")
+        newton = (6 if turned else 3) if "resolved_rate" in self.places else 0
+        return {"shown": self.shown, "width": self.width, "newton": newton}
 
     @property
     def side(self) -> int | None:

@@ -75,7 +75,7 @@ class WorldChanges:
         other = copy(self)
         other.problem = self.problem.replace(observation=observation)
         layout = ObservationLayout.of(other.problem, self.arm)
-        other.rules = self.rules._replace(shown=layout.shown, width=layout.width)
+        other.rules = self.rules._replace(**layout.rules(other.problem))
         return other
 
     def in_scene(self, start: ArrayLike, goal: ArrayLike) -> Self:

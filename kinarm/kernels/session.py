@@ -47,6 +47,7 @@ def layouts(
     goal_width: int = 0,
     looks: int = 0,
     shares: int = 0,
+    newton: int = 0,
 ) -> tuple[Layout, Layout]:
     """Layouts of a block and of a single episode's space.
 
@@ -69,6 +70,8 @@ def layouts(
         1 for a shield that looks at what follows from a step, else 0.
     shares : int
         Shares of a step that a shield may try.
+    newton : int
+        Errors of a goal that a Newton step is to remove; 0 if none is seen.
     """
     has_plant, beyond = Fixed(plant > 0), Fixed(goal_width > 0)
     block = {
@@ -103,6 +106,11 @@ def layouts(
         # Move of an axis (column) in the step, times itself and twice those before it, from the
         # first one (row) that counts [rad^2].
         "twist": (n_actuated, n_actuated),
+        # Errors of the goal, their Jacobian, work space, and the step that removes them.
+        "error": (Fixed(newton),),
+        "jacobian": (Fixed(newton), n_actuated),
+        "square": (Fixed(newton + 1 if newton else 0), Fixed(newton)),
+        "newton": (Fixed(newton > 0), n_actuated),
         # Fractions of step limits; layers and own parameters of networks.
         "action": (ONE, n_actuated),
         "hidden": (Fixed(2), widest),
@@ -272,6 +280,7 @@ class Session(Record):
             "goal_width": self.episodes.pursuit.reached.shape[1],
             "looks": int(lags and len(rules.values.shield) > 0),
             "shares": len(rules.values.shield),
+            "newton": rules.values.newton,
         }
         space = work_space(**sizes)
         furnish(shapes.values.placed, *space)
