@@ -44,6 +44,8 @@ class Rules(NamedTuple):
     shown, width : ndarray of int, shape (n_parts, 2), and int
         First entry of each part in the observation of a step, and how often
         it is there, 0 if not; and entries of that observation.
+    newton : int
+        Errors of a goal that a Newton step of the observation is to remove.
     boxes : ndarray, shape (n_placed, 2, 3)
         Middle and half-size of a box around each body of the scene, before its
         size.

@@ -18,6 +18,7 @@ from kinarm.errors import LARGEST
 from kinarm.goals import GOAL_RESTS, REST_ERRORS, finer
 from kinarm.inverse_kinematics import approach_axis
 from kinarm.kernels.compiling import Array
+from kinarm.kernels.inverse import DAMPING, LEAST_DAMPING
 from kinarm.observation import FINE
 from kinarm.observation_part import SLOTS
 from kinarm.reference_plant import ReferencePlant
@@ -215,6 +216,7 @@ class ReferenceSimulator:
             "goal": lambda: goal[:3],
             "goal_minus_tool": lambda: offset,
             finer("goal_minus_tool"): lambda: offset / (np.linalg.norm(offset) + FINE),
+            "resolved_rate": lambda: self._resolved_rate(q, goal, pose),
             "orientation": lambda: self._quaternions(q),
             "position": lambda: positions,
             "joint_positions": lambda: q,
@@ -253,6 +255,32 @@ class ReferenceSimulator:
             found.append((distance, np.concatenate(row)))
         rows = [row for _, row in sorted(found, key=lambda each: each[0])[:slots]]
         return np.array([*rows, *[np.zeros(12)] * (slots - len(rows))])
+
+    def _resolved_rate(self, q: Array, goal: Array, pose: pin.SE3) -> Array:
+        """Damped Newton step to the goal, by Pinocchio's Jacobian."""
+        limit, kind, rest = self._world.rules.step_limit, self.task.goal.kind, goal[3:]
+        frame = self.arm.model.getFrameId(self.arm.tool_frame, pin.FrameType.BODY)
+        seen_from = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
+        jacobian = pin.computeFrameJacobian(self.arm.model, self._data, q, frame, seen_from)
+        moved, turned = jacobian[:3, : len(limit)], jacobian[3:, : len(limit)]
+        error = goal[:3] - pose.translation
+        if kind == "direction":
+            reached = self._data.oMi[self.arm.n_joints].rotation @ approach_axis(self.arm)
+            longer = 1 / np.sqrt(max(0.5 + 0.5 * (reached @ rest), 1e-6))
+            error = np.concatenate([error, longer * np.cross(reached, rest)])
+            moved = np.vstack([moved, turned - np.outer(reached, reached @ turned)])
+        elif kind == "pose":
+            turn = pin.Quaternion(*rest) * pin.Quaternion(pose.rotation).inverse()
+            error = np.concatenate([error, 2 * np.copysign(1, turn.w) * turn.vec()])
+            moved = np.vstack([moved, turned])
+        if kind == "configuration":
+            step = rest[: len(limit)] - q[: len(limit)]
+        else:
+            damping = DAMPING * (error @ error) + LEAST_DAMPING
+            square = moved @ moved.T + damping * np.eye(len(error))
+            step = moved.T @ np.linalg.solve(square, error)
+        action = step / limit
+        return np.array(action / max(1.0, np.abs(action).max()))
 
     def _turn(self, q: Array, rotation: Array, rest: Array) -> tuple[Array, float]:
         """Difference of a goal's rest from what is reached, and its size [rad, or rad or m]."""

@@ -13,6 +13,13 @@ from kinarm.kernels.surroundings import Seen
 @inlined
 def write_resolved_rate(session: Session, seen: Seen, start: int, count: int) -> None:
     """Damped Newton step of each actuated joint to the goal, by its limit, at most 1 as a whole."""
+    if session.block.newton.shape[0] > 0:
+        _resolve(session, seen, start, count)
+
+
+@inlined
+def _resolve(session: Session, seen: Seen, start: int, count: int) -> None:
+    """The same, where there is work space for it."""
     block, goal, limit = session.block, session.rules.goal, session.rules.step_limit
     step, longest = block.newton[0], 1.0 + 0.0 * seen.tool[0]
     if goal.kind == CONFIGURATION:

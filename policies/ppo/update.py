@@ -4,6 +4,7 @@ An actor may imitate the oracle first, since reinforcement spends most steps on 
 all. Imitation alone reaches far fewer goals: it never sees where its own errors lead.
 """
 
+import itertools
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -81,14 +82,18 @@ def update(
     steps_before = iteration * config.n_epochs * (n_steps // size)
     gradients = np.empty((PARTS, len(networks.weights)), dtype=np.float32)
     losses, records = np.empty((PARTS, LOSSES)), []
-    for _ in range(config.n_epochs):
-        for chosen in rng.permutation(n_steps).reshape(-1, size):
-            standard = standardisation(chosen, experience.advantages)
-            arrays = (experience, chosen, objective, standard, gradients, losses)
-            nets = (networks.actor, networks.critic)
-            _find_gradients(threads, *nets, *arrays)
-            records.append((*losses.sum(axis=0) * objective.share, networks.log_std.mean()))
-            descend(*nets, *moments, gradients, descent, steps_before + len(records))
+    most = np.inf if config.target_kl is None else 1.5 * config.target_kl
+    passes = (rng.permutation(n_steps).reshape(-1, size) for _ in range(config.n_epochs))
+    for chosen in itertools.chain.from_iterable(passes):
+        standard = standardisation(chosen, experience.advantages)
+        arrays = (experience, chosen, objective, standard, gradients, losses)
+        nets = (networks.actor, networks.critic)
+        _find_gradients(threads, *nets, *arrays)
+        means = losses.sum(axis=0) * objective.share
+        if means[UpdateRecords._fields.index("divergence")] > most:
+            break
+        records.append((*means, networks.log_std.mean()))
+        descend(*nets, *moments, gradients, descent, steps_before + len(records))
     return UpdateRecords(*np.array(records).T)
 
 
@@ -104,7 +109,8 @@ def logged(
     point, records, experience
         Results of an iteration.
     """
-    n_actions, minibatches = experience.actions.shape[1], len(records.log_std) // config.n_epochs
+    n_actions = experience.actions.shape[1]
+    minibatches = config.steps_per_iteration // config.batch_size
     entropy = n_actions * (records.log_std + 0.5 + HALF_LOG_2_PI)
     losses = records.policy_loss - config.ent_coef * entropy + config.vf_coef * records.value_loss
     unexplained = np.var(experience.advantages) / np.var(experience.returns)

@@ -86,7 +86,8 @@ def test_the_reference_agrees_with_a_plant(kind):
     # Policies see what is measured, and are judged by what is.
     seen = Observation().names(kind)
     fine = [finer(name) for name in seen if name in ("goal_minus_tool", *REST_ERRORS)]
-    settings = {"plant": "ur", "tolerance": 0.1, "observation": [*seen, *fine]}
+    shown = [*seen, *fine, "resolved_rate"]
+    settings = {"plant": "ur", "tolerance": 0.1, "observation": shown}
     compare_with_reference(simulator_of({**KINDS[kind], "sequence": 2}, **settings))
 
 

@@ -120,7 +120,7 @@ def test_memory(observation, plant, tmp_path):
 @pytest.mark.parametrize("kind", ["direction", "pose", "configuration"])
 def test_goals_beyond_points(kind, tmp_path):
     seen = Observation().names(kind)
-    fine = [finer("goal_minus_tool"), finer(seen[-1])]
+    fine = [finer("goal_minus_tool"), finer(seen[-1]), "resolved_rate"]
     problem = ReachProblem.load("both").replace(goal={"kind": kind}, observation=[*seen, *fine])
     policy = policy_for(problem)
     export_policy(policy, tmp_path / "out", onnx=False)
