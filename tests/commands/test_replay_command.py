@@ -219,17 +219,17 @@ class TestPlayground:
         assert not (tmp_path / "made.html").exists()
 
     def test_policies_that_differ(self, replay, tmp_path):
-        """Another observation than the first one's, bodies that are seen, and another arm."""
+        """A part that pages do not know, bodies that are seen, and another arm."""
         both = ReachProblem.load("both")
         for name, changed in (
-            ("angles", {"observation": ["goal", "joint_angles"]}),
+            ("rate", {"observation": ["goal", "resolved_rate"]}),
             ("near", {"observation": ["goal", "proximity"]}),
             ("flange", {"arm": "paper_flange"}),
         ):
             policy_for(both.replace(**changed)).save(tmp_path / f"{name}.npz")
-        angles, near, flange = (tmp_path / f"{name}.npz" for name in ("angles", "near", "flange"))
-        said = "'angles' does not run here: policy 'angles' sees other observations"
-        check_refused(replay("--play", PLAYED[0], angles), said)
+        rate, near, flange = (tmp_path / f"{name}.npz" for name in ("rate", "near", "flange"))
+        said = "'rate' does not run here: pages do not know what it sees: resolved_rate"
+        check_refused(replay("--play", PLAYED[0], rate), said)
         check_refused(replay("--play", near), "'near' does not run here: the policy sees proximity")
         said = "'flange' does not run here: the policy was trained for arm 'paper_flange', not for"
         check_refused(replay("--play", PLAYED[0], flange), said)
