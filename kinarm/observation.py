@@ -4,7 +4,6 @@ A new part is a function that writes it and an entry of `OBSERVATION`; all else 
 chooses some (`kinarm.Observation`). Policies of another layout are refused.
 """
 
-import math
 from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING, Any
 
@@ -14,9 +13,17 @@ from kinarm.errors import LARGEST
 from kinarm.goals import REST_PARTS, finer
 from kinarm.kernels.compiling import Array, inlined
 from kinarm.kernels.elementary import sine_cosine
-from kinarm.kernels.goals import nearer_sign, write_reached
+from kinarm.kernels.goal_parts import (
+    FINE,
+    write_fine_offset,
+    write_fine_rest_error,
+    write_goal,
+    write_offset,
+    write_resolved_rate,
+    write_rest,
+    write_rest_error,
+)
 from kinarm.kernels.plant import COMMAND
-from kinarm.kernels.resolved_rate import write_resolved_rate
 from kinarm.kernels.session import Session
 from kinarm.kernels.surroundings import NEAR, Seen, write_obstacles, write_proximity
 from kinarm.observation_part import ACTUATED, JOINTS, ONCE, SLOTS, Part, Ranges
@@ -27,53 +34,6 @@ if TYPE_CHECKING:
 
 VERSION = 1
 """To be raised when a part's meaning changes, but not its name and length."""
-
-
-FINE = 0.02
-"""Error that a fine part shows as one half [m, rad or of quaternions]."""
-
-
-@inlined
-def write_goal(session: Session, seen: Seen, start: int, count: int) -> None:
-    """Position of the goal.
-
-    Parameters
-    ----------
-    session, seen : Session and Seen
-        What the step is made of, and what is seen after it. The observation,
-        ``session.block.observation``, has the shape (1, n_observations).
-    start, count : int
-        The part's first entry, and how often it is there, one after the other.
-    """
-    for i in range(3):
-        session.block.observation[0, start + i] = seen.goal[0, i]
-
-
-@inlined
-def _write_offset(session: Session, seen: Seen, start: int, count: int) -> None:
-    """Goal minus tool point."""
-    session.block.observation[0, start] = seen.goal[0, 0] - seen.tool[0]
-    session.block.observation[0, start + 1] = seen.goal[0, 1] - seen.tool[1]
-    session.block.observation[0, start + 2] = seen.goal[0, 2] - seen.tool[2]
-
-
-@inlined
-def _write_fine_offset(session: Session, seen: Seen, start: int, count: int) -> None:
-    """The same over its length plus `FINE`."""
-    _write_offset(session, seen, start, count)
-    _refine(session, start, 3)
-
-
-@inlined
-def _refine(session: Session, start: int, n: int) -> None:
-    """Divide n entries by their length plus `FINE`, so that small ones show."""
-    observation = session.block.observation
-    squares = 0.0 * observation[0, start]
-    for i in range(n):
-        squares += observation[0, start + i] * observation[0, start + i]
-    scale = 1.0 / (math.sqrt(squares) + FINE)
-    for i in range(n):
-        observation[0, start + i] *= scale
 
 
 @inlined
@@ -141,33 +101,6 @@ def _write_time(session: Session, seen: Seen, start: int, count: int) -> None:
     session.block.observation[0, start] = (horizon - session.block.steps[0]) / horizon
 
 
-@inlined
-def _write_rest(session: Session, seen: Seen, start: int, count: int) -> None:
-    """What a goal has beside its position."""
-    for i in range(session.block.goal.shape[1] - 3):
-        session.block.observation[0, start + i] = seen.goal[0, 3 + i]
-
-
-@inlined
-def _write_rest_error(session: Session, seen: Seen, start: int, count: int) -> None:
-    """The same less that of the tool."""
-    goal, block = session.rules.goal, session.block
-    if block.turn.shape[0] > 0:
-        reached = block.seen_reached
-        write_reached(goal, seen.tool, seen.frames, seen.joints, reached, 0)
-        sign = nearer_sign(goal.kind, reached, 0, seen.goal, 0)
-        for i in range(3, block.goal.shape[1]):
-            missing = seen.goal[0, i] - sign * reached[0, i]
-            block.observation[0, start + i - 3] = missing
-
-
-@inlined
-def _write_fine_rest_error(session: Session, seen: Seen, start: int, count: int) -> None:
-    """The same over its length plus `FINE`."""
-    _write_rest_error(session, seen, start, count)
-    _refine(session, start, session.block.goal.shape[1] - 3)
-
-
 def _slides(arm: "Arm", _: Scene) -> str:
     sliding = [arm.joint_names[k] for k in np.flatnonzero(arm.chain.prismatic)]
     return f"joint {sliding[0]} slides; joint_positions takes it" if sliding else ""
@@ -195,9 +128,9 @@ def _rest_parts(
     """The rest of a kind of goals, its error, and that over its length plus `FINE`."""
     rest, missing = REST_PARTS[kind]
     writers = {
-        rest: _write_rest,
-        missing: _write_rest_error,
-        finer(missing): _write_fine_rest_error,
+        rest: write_rest,
+        missing: write_rest_error,
+        finer(missing): write_fine_rest_error,
     }
     for number, (name, write) in enumerate(writers.items()):
         error, fine = number > 0, number > 1
@@ -240,7 +173,7 @@ OBSERVATION = (
         unit="m",
         signs=POLAR,
         bounds=lambda ranges: (ranges.goal_lower - ranges.reach, ranges.goal_upper + ranges.reach),
-        write=_write_offset,
+        write=write_offset,
         of_goal=True,
     ),
     Part(
@@ -249,7 +182,7 @@ OBSERVATION = (
         unit="1",
         signs=POLAR,
         bounds=lambda _: (-UNIT, UNIT),
-        write=_write_fine_offset,
+        write=write_fine_offset,
         of_goal=True,
     ),
     Part(

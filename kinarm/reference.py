@@ -18,8 +18,8 @@ from kinarm.errors import LARGEST
 from kinarm.goals import GOAL_RESTS, REST_ERRORS, finer
 from kinarm.inverse_kinematics import approach_axis
 from kinarm.kernels.compiling import Array
+from kinarm.kernels.goal_parts import FINE
 from kinarm.kernels.inverse import DAMPING, LEAST_DAMPING
-from kinarm.observation import FINE
 from kinarm.observation_part import SLOTS
 from kinarm.reference_plant import ReferencePlant
 from kinarm.scenarios import draw_followers

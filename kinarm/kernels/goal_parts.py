@@ -1,4 +1,7 @@
-"""Resolved-rate control (Whitney 1969): the step of inverse kinematics from here to the goal."""
+"""Formulas of the observation's parts that depend on the goal.
+
+One is resolved-rate control (Whitney 1969): the step of inverse kinematics from here to the goal.
+"""
 
 import math
 
@@ -8,6 +11,79 @@ from kinarm.kernels.inverse import DAMPING, LEAST_DAMPING, damped_step
 from kinarm.kernels.kinematics import point_jacobian
 from kinarm.kernels.session import Session
 from kinarm.kernels.surroundings import Seen
+
+FINE = 0.02
+"""Error that a fine part shows as one half [m, rad or of quaternions]."""
+
+
+@inlined
+def write_goal(session: Session, seen: Seen, start: int, count: int) -> None:
+    """Position of the goal.
+
+    Parameters
+    ----------
+    session, seen : Session and Seen
+        What the step is made of, and what is seen after it. The observation,
+        ``session.block.observation``, has the shape (1, n_observations).
+    start, count : int
+        The part's first entry, and how often it is there, one after the other.
+    """
+    for i in range(3):
+        session.block.observation[0, start + i] = seen.goal[0, i]
+
+
+@inlined
+def write_offset(session: Session, seen: Seen, start: int, count: int) -> None:
+    """Goal minus tool point."""
+    session.block.observation[0, start] = seen.goal[0, 0] - seen.tool[0]
+    session.block.observation[0, start + 1] = seen.goal[0, 1] - seen.tool[1]
+    session.block.observation[0, start + 2] = seen.goal[0, 2] - seen.tool[2]
+
+
+@inlined
+def write_fine_offset(session: Session, seen: Seen, start: int, count: int) -> None:
+    """The same over its length plus `FINE`."""
+    write_offset(session, seen, start, count)
+    _refine(session, start, 3)
+
+
+@inlined
+def _refine(session: Session, start: int, n: int) -> None:
+    """Divide n entries by their length plus `FINE`, so that small ones show."""
+    observation = session.block.observation
+    squares = 0.0 * observation[0, start]
+    for i in range(n):
+        squares += observation[0, start + i] * observation[0, start + i]
+    scale = 1.0 / (math.sqrt(squares) + FINE)
+    for i in range(n):
+        observation[0, start + i] *= scale
+
+
+@inlined
+def write_rest(session: Session, seen: Seen, start: int, count: int) -> None:
+    """What a goal has beside its position."""
+    for i in range(session.block.goal.shape[1] - 3):
+        session.block.observation[0, start + i] = seen.goal[0, 3 + i]
+
+
+@inlined
+def write_rest_error(session: Session, seen: Seen, start: int, count: int) -> None:
+    """The same less that of the tool."""
+    goal, block = session.rules.goal, session.block
+    if block.turn.shape[0] > 0:
+        reached = block.seen_reached
+        write_reached(goal, seen.tool, seen.frames, seen.joints, reached, 0)
+        sign = nearer_sign(goal.kind, reached, 0, seen.goal, 0)
+        for i in range(3, block.goal.shape[1]):
+            missing = seen.goal[0, i] - sign * reached[0, i]
+            block.observation[0, start + i - 3] = missing
+
+
+@inlined
+def write_fine_rest_error(session: Session, seen: Seen, start: int, count: int) -> None:
+    """The same over its length plus `FINE`."""
+    write_rest_error(session, seen, start, count)
+    _refine(session, start, session.block.goal.shape[1] - 3)
 
 
 @inlined
