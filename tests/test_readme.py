@@ -51,7 +51,7 @@ def test_the_short_table_is_that_of_the_results():
     successes = {}
     rows = re.findall(r"^\| (left|right|both) +\| (\S+) +\| +(.*?) \|", RESULTS, re.MULTILINE)
     for problem, policy, success in rows:
-        recipe = re.sub("-(left|right|both)$", "", policy)
+        recipe = re.sub(r"-(left|right|both)(?=\+|$)", "", policy)
         successes.setdefault(recipe, {})[problem] = success
     found = re.findall(r"^\| `(\S+)` \| (.*) \| (.*) \| (.*) \|$", README, re.MULTILINE)
     assert {"oracle", "random", "ars-paper", "ppo-best"} <= {recipe for recipe, *_ in found}
