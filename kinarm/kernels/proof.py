@@ -145,7 +145,7 @@ def prove_alone(
 
     Poses are ``before`` the step and at the target. Returns a number whose bit k - 1 is set if
     configuration, or interval, k is not proven free. Of a step that is tested throughout, it is
-    minus the number, from 1, of a pair that touches at its end. If it shall be ``quick``, it is
+    minus the number, from 1, of a pair that touches in it. If it shall be ``quick``, it is
     that of any pair in doubt, and suspected pairs are looked at first.
     """
     plane, planes = alone.plane, as_numbers(block.planes)
@@ -200,8 +200,10 @@ def prove_alone(
             # The first interval in doubt is worth a closer look.
             refused, finer = -1, INTERVALS * parts
             for j in range(INTERVALS * (k - 1) + 1, INTERVALS * k + 1):
-                if refused < 0:
+                if refused == -1:
                     refused = refusing_pair(j, finer, *given)
+        if refused < -1:
+            return 1 + refused
         if quick and refused >= 0:
             return -1 - refused
         doubt |= 0 if refused < 0 else bit
@@ -221,7 +223,10 @@ def refusing_pair(
     block: Block,
     alone: Alone,
 ) -> int:
-    """First listed pair with a bit that is not proven free at configuration k, or to it, or -1."""
+    """First listed pair with a bit that is not proven free at configuration k, or to it, or -1.
+
+    Of a step that is tested throughout, it is -2 less the pair if that surely touches there.
+    """
     bends = as_numbers(block.bend)
     if tested == 0:
         place_between(k - 1, parts, lane, chain, shapes, block, alone, alone.after)
@@ -230,8 +235,9 @@ def refusing_pair(
         pair = alone.listed[index, 0]
         if alone.listed[index, 1] & bit != 0:
             bend = bends[pair, lane] / (parts * parts) if tested == 0 else -1.0
-            if verdict_of(pair, lane, bend, shapes, block, alone) < 1:
-                return int(pair)
+            verdict = verdict_of(pair, lane, bend, shapes, block, alone)
+            if verdict < 1:
+                return int(pair) if verdict == 0 or tested > 0 else -2 - int(pair)
     return -1
 
 
