@@ -17,9 +17,6 @@ import numpy as np
 CONSTANT_BELOW = 1e-6
 """Inputs with a smaller standard deviation in training count as constant."""
 
-KINDS = ("position", "direction", "pose", "configuration")
-"""Kinds of goals."""
-
 FINE = 0.02
 """Error that a fine part of the observation shows as one half."""
 
@@ -72,7 +69,6 @@ def arm_arrays(contract: Any) -> dict[str, Any]:
     for name in ("lower", "upper", "velocity_limit"):
         arm[name] = arm[name][: sum(each["actuated"] for each in joints)]
     arm["step"] = arm.pop("velocity_limit") * contract["time_step"]
-    arm["kind"] = np.zeros(KINDS.index(contract["goal"]["kind"]))  # by its length
     arm["slides"] = np.array([1.0 if each["kind"] == "prismatic" else 0.0 for each in joints])
     return {**arm, **{f"tool_{name}": np.array(place) for name, place in tool.items()}}
 
@@ -104,7 +100,7 @@ def times(matrix: Any, vector: Any) -> Any:
 
 
 def forward_kinematics(xp: Any, arm: Any, joints: Any) -> tuple[list[Any], list[Any], Any, Any]:
-    """Orientations w x y z and positions [m] of joint frames, their rotations, and the tool."""
+    """Orientations w x y z and positions [m] of joint frames, rotation of the last, and tool."""
     half = (0.5 * joints * (1.0 - arm["slides"]))[..., None]
     turn = xp.concatenate([xp.cos(half), xp.sin(half) * arm["axis"]], -1)
     turn = times(multiplier(xp, turn, FROM_RIGHT), arm["rotation"])
@@ -121,53 +117,7 @@ def forward_kinematics(xp: Any, arm: Any, joints: Any) -> tuple[list[Any], list[
     for k in range(1, joints.shape[-1]):
         positions.append(positions[-1] + offset[..., k - 1, :] + slid[..., k, :])
     last = rotations[..., -1, :, :]
-    return quaternions, positions, rotations, positions[-1] + times(last, arm["tool_position"])
-
-
-def resolved_rate(xp: Any, arm: Any, moving: Any, joints: Any, goal: Any) -> Any:
-    """Action of a damped Newton step to the goal; ``moving`` are the results of kinematics."""
-    (quaternions, positions, rotations, tool), n, rest = moving, len(arm["step"]), goal[..., 3:]
-    kind = KINDS[len(arm["kind"])]
-    slides, axes = arm["slides"][:n, None], times(rotations, arm["axis"])[..., :n, :]
-    lever = tool[..., None, :] - xp.stack(positions, -2)[..., :n, :]
-    turned, error = (1.0 - slides) * axes, goal[..., :3] - tool
-    moved, turn = slides * axes + cross(xp, turned, lever), None
-    if kind == "direction":
-        reached = times(rotations[..., -1, :, :], arm["tool_axis"])
-        cosine = (reached * rest).sum(-1)[..., None]
-        turn = cross(xp, reached, rest) / xp.clip(0.5 + 0.5 * cosine, 1e-6, 1.0) ** 0.5
-        turned = turned - times(turned, reached)[..., None] * reached[..., None, :]
-    elif kind == "pose":
-        reached = times(multiplier(xp, arm["tool_rotation"], FROM_RIGHT), quaternions[-1])
-        off = times(multiplier(xp, reached * xp.asarray([1, -1, -1, -1]), FROM_RIGHT), rest)
-        turn = 2.0 * xp.where(off[..., :1] < 0, -off, off)[..., 1:]
-    if turn is not None:
-        moved, error = xp.concatenate([moved, turned], -1), xp.concatenate([error, turn], -1)
-    if kind == "configuration":
-        step = rest[..., :n] - joints[..., :n]
-    else:
-        damping = 0.1 * (error * error).sum(-1)[..., None, None] + 1e-12
-        square = moved.swapaxes(-1, -2) @ moved + damping * xp.asarray(np.eye(error.shape[-1]))
-        step = times(moved, solved(xp, square, error))
-    action = step / arm["step"]
-    return action / xp.clip(xp.amax(abs(action), -1)[..., None], 1.0, 1e9)
-
-
-def solved(xp: Any, square: Any, right: Any) -> Any:
-    """Solution of a positive definite system, shapes (..., n, n) and (..., n)."""
-    whole, n = xp.concatenate([square, right[..., None]], -1), right.shape[-1]
-    rows = [whole[..., i, :] for i in range(n)]
-    for i in range(n):
-        rows[i] = rows[i] / rows[i][..., i : i + 1]
-        for j in {*range(n)} - {i}:
-            rows[j] = rows[j] - rows[j][..., i : i + 1] * rows[i]
-    return xp.stack([row[..., n] for row in rows], -1)
-
-
-def cross(xp: Any, a: Any, b: Any) -> Any:
-    """Cross product of vectors, shapes (..., 3)."""
-    pairs = ((1, 2), (2, 0), (0, 1))
-    return xp.stack([a[..., i] * b[..., j] - a[..., j] * b[..., i] for i, j in pairs], -1)
+    return quaternions, positions, last, positions[-1] + times(last, arm["tool_position"])
 
 
 def observe(
@@ -182,8 +132,8 @@ def observe(
     time_left: Any = None,
 ) -> Any:
     """Observation of a step: the parts of these names, one after the other."""
-    moving = quaternions, positions, rotations, tool = forward_kinematics(xp, arm, joints)
-    rest, rotation = goal[..., 3:], rotations[..., -1, :, :]
+    quaternions, positions, rotation, tool = forward_kinematics(xp, arm, joints)
+    rest = goal[..., 3:]
 
     def angles() -> Any:
         pairs = xp.stack([xp.sin(joints), xp.cos(joints)], -1)
@@ -216,7 +166,6 @@ def observe(
         "fine_direction_error": lambda: refined(parts["direction_error"]()),
         "fine_rotation_error": lambda: refined(rotation_error()),
         "fine_joints_error": lambda: refined(rest - joints),
-        "resolved_rate": lambda: resolved_rate(xp, arm, moving, joints, goal),
     }
     return xp.concatenate([parts[name]() for name in names], -1)
 

@@ -126,12 +126,9 @@ def contract_of(
     """
     world = world.seen_as(policy.observation)
     problem, arm, layout, made = world.problem, world.arm, world.layout, policy.provenance
-    if layout.sees_bodies:
-        seen = [name for name in ("proximity", "obstacles") if name in layout.places]
-        raise InvalidInputError(
-            f"the policy sees {' and '.join(seen)}; without kinarm, only policies run that see no "
-            "bodies"
-        )
+    seen = [name for name in ("proximity", "obstacles", "resolved_rate") if name in layout.places]
+    if seen:
+        raise InvalidInputError(f"the policy sees {' and '.join(seen)}: it needs kinarm to run")
     signs, offsets = _wiring(arm, sign, offset)
     task, plant, dt, rules = problem.task, problem.plant, problem.stepping.time_step, world.rules
     slides = arm.chain.prismatic.tolist()

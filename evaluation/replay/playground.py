@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 PLAYED = ("ppo-best-both", "ppo-precise-both", "ars-linear-both", "ars-paper-both")
 """Policies that a playground has by default."""
 
-NOT_IN_PAGES = (*map(finer, ("goal_minus_tool", *REST_ERRORS)), "resolved_rate")
+NOT_IN_PAGES = (*map(finer, ("goal_minus_tool", *REST_ERRORS)),)
 """Parts of observations that the scripts of pages do not compute."""
 
 OFFERED = 20

@@ -31,7 +31,7 @@ DRAGGED = """async () => {
     }
 }"""
 LOOK = "[[-2.35, 1.85, 1.5], [0, 0, 0.3]]"
-OTHERS = {"proximity", "obstacles", *NOT_IN_PAGES, *chain(*REST_PARTS.values())}
+OTHERS = {"proximity", "obstacles", "resolved_rate", *NOT_IN_PAGES, *chain(*REST_PARTS.values())}
 SEEN = [part.name for part in OBSERVATION if part.name not in OTHERS]
 
 

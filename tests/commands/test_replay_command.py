@@ -222,14 +222,14 @@ class TestPlayground:
         """A part that pages do not know, bodies that are seen, and another arm."""
         both = ReachProblem.load("both")
         for name, changed in (
-            ("rate", {"observation": ["goal", "resolved_rate"]}),
+            ("fine", {"observation": ["goal", "fine_goal_minus_tool"]}),
             ("near", {"observation": ["goal", "proximity"]}),
             ("flange", {"arm": "paper_flange"}),
         ):
             policy_for(both.replace(**changed)).save(tmp_path / f"{name}.npz")
-        rate, near, flange = (tmp_path / f"{name}.npz" for name in ("rate", "near", "flange"))
-        said = "'rate' does not run here: pages do not know what it sees: resolved_rate"
-        check_refused(replay("--play", PLAYED[0], rate), said)
+        fine, near, flange = (tmp_path / f"{name}.npz" for name in ("fine", "near", "flange"))
+        said = "'fine' does not run here: pages do not know what it sees: fine_goal_minus_tool"
+        check_refused(replay("--play", PLAYED[0], fine), said)
         check_refused(replay("--play", near), "'near' does not run here: the policy sees proximity")
         said = "'flange' does not run here: the policy was trained for arm 'paper_flange', not for"
         check_refused(replay("--play", PLAYED[0], flange), said)

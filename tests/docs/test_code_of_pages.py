@@ -31,7 +31,6 @@ EXCEPTIONS = {
     r"pip download|tar -x|kinarm-problem import .*ur5": "needs a download; tests/kinarm",
     r"\. \.venv/bin/activate": "changes the shell; tests/packaging/first_steps.py",
     r"python -m tests\.campaign": "takes hours; tests/campaign runs a share of each",
-    r"python -m docs\.transfer": "trains for an hour; tests/frozen",
     r"python -m docs\.measurements": "measures for minutes; tests/docs/test_measurements.py",
     r"python tests/instructions": "records anew; tests/instructions compares",
     r"kinarm-bench": "measures for minutes; tests/commands/test_bench_command.py",
