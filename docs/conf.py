@@ -58,7 +58,7 @@ maximum_signature_line_length = 76
 nitpick_ignore_regex = [
     (r"py:.*", r"(numpy|pinocchio|coal|gymnasium|msgspec|pathlib|collections|typing)\..*"),
     (r"py:data", r"Ellipsis"),
-    (r"py:class", r"kinarm\.observation_layout\.ObservationLayout"),
+    (r"py:class", r"kinarm\.(observation_layout\.ObservationLayout|viewer\.html_page\.HtmlPage)"),
     (r"py:class", r"Figure"),  # matplotlib, which is imported when first used
     # NumPy's, where annotations are kept as they are written.
     (r"py:class", r"NDArray|ndarray|Array|np\.\w+"),
