@@ -1,7 +1,7 @@
 """The observation: its parts in a table, each with its formula.
 
 A new part is a function that writes it and an entry of `OBSERVATION`; all else follows. A problem
-chooses some (`kinarm.Observation`). Policies of another layout are refused.
+chooses some (`kinarm.Observation`).
 """
 
 from collections.abc import Iterator, Sequence

@@ -62,7 +62,7 @@ def export_policy(
     Parameters
     ----------
     policy : Policy
-        A policy that does not see bodies of the scene.
+        A policy that sees neither bodies of the scene nor ``resolved_rate``.
     folder : str or Path
         Where to, a new folder.
     overwrite : bool
@@ -122,7 +122,8 @@ def contract_of(
 ) -> dict[str, Any]:
     """What somebody who runs the policy in a world has to know, a runtime reads, and a self-test.
 
-    Sign and offset are those of `export_policy`. InvalidInputError if the policy sees bodies.
+    Sign and offset are those of `export_policy`. InvalidInputError if the policy sees what
+    only kinarm computes.
     """
     world = world.seen_as(policy.observation)
     problem, arm, layout, made = world.problem, world.arm, world.layout, policy.provenance

@@ -17,6 +17,7 @@ from kinarm.policies.recipes import shipped_learner
 from kinarm.problem import ReachProblem
 
 OPTIONAL_SHARE = {"must": "lie in (0, 1]", "holds": lambda value: 0 < value <= 1, **OPTIONAL}
+"""Metadata of a share that is not zero."""
 
 
 @dataclass(frozen=True, kw_only=True)

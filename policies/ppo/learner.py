@@ -105,7 +105,6 @@ class PPOTraining:
 
         config, arms, networks = self.config, self.arms, self.networks
         rng = stream_generator(Stream.PPO_DEMONSTRATIONS, config.seed)
-        arms.reach_within(config.tolerance_at(1.0))  # motions end at its edge
         scenarios = arms.sample(rng, config.demonstrations)
         oracle = Oracle(arms.simulator.problem, threads=self.threads)
         shown = oracle.demonstrate(*scenarios)
