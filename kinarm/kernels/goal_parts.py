@@ -7,7 +7,13 @@ import math
 
 from kinarm.kernels.compiling import inlined
 from kinarm.kernels.goals import CONFIGURATION, DIRECTION, POSE, nearer_sign, write_reached
-from kinarm.kernels.inverse import DAMPING, LEAST_DAMPING, damped_step
+from kinarm.kernels.inverse import (
+    DAMPING,
+    LEAST_DAMPING,
+    damped_step,
+    half_turn_factor,
+    take_out_turns,
+)
 from kinarm.kernels.kinematics import point_jacobian
 from kinarm.kernels.session import Session
 from kinarm.kernels.surroundings import Seen
@@ -128,17 +134,11 @@ def _find_errors(session: Session, seen: Seen) -> None:
         if goal.kind == DIRECTION:
             ax, ay, az = reached[0, 3], reached[0, 4], reached[0, 5]
             bx, by, bz = seen.goal[0, 3], seen.goal[0, 4], seen.goal[0, 5]
-            # Of the sine of the angle, that of its half, which grows up to a half turn.
-            cosine = ax * bx + ay * by + az * bz
-            longer = 1.0 / math.sqrt(max(0.5 + 0.5 * cosine, 1e-6))
+            longer = half_turn_factor(ax * bx + ay * by + az * bz)
             block.error[3] = longer * (ay * bz - az * by)
             block.error[4] = longer * (az * bx - ax * bz)
             block.error[5] = longer * (ax * by - ay * bx)
-            for k in range(jacobian.shape[1]):  # turns about the axis do not count
-                along = ax * jacobian[3, k] + ay * jacobian[4, k] + az * jacobian[5, k]
-                jacobian[3, k] -= along * ax
-                jacobian[4, k] -= along * ay
-                jacobian[5, k] -= along * az
+            take_out_turns((ax, ay, az), jacobian)
         elif goal.kind == POSE:
             sign = 2.0 * nearer_sign(goal.kind, reached, 0, seen.goal, 0)
             aw, ax, ay, az = reached[0, 3], reached[0, 4], reached[0, 5], reached[0, 6]

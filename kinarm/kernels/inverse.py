@@ -74,6 +74,22 @@ class Search(NamedTuple):
 
 
 @inlined
+def half_turn_factor(cosine: float) -> float:
+    """From the sine of an angle to twice that of its half, which grows up to a half turn."""
+    return 1.0 / math.sqrt(max(0.5 + 0.5 * cosine, 1e-6))
+
+
+@inlined
+def take_out_turns(axis: Vector, jacobian: Array) -> None:
+    """Take turns about an axis out of the last three rows of a Jacobian."""
+    for k in range(jacobian.shape[1]):
+        along = axis[0] * jacobian[3, k] + axis[1] * jacobian[4, k] + axis[2] * jacobian[5, k]
+        jacobian[3, k] -= along * axis[0]
+        jacobian[4, k] -= along * axis[1]
+        jacobian[5, k] -= along * axis[2]
+
+
+@inlined
 def orientation_error(axes: Array, poses: Array, wanted: Array, jacobian: Array) -> Vector:
     """Vector about which the tool has to turn, as long as a small angle is [rad].
 
@@ -90,15 +106,10 @@ def orientation_error(axes: Array, poses: Array, wanted: Array, jacobian: Array)
         wz += ax * by - ay * bx
         cosine += ax * bx + ay * by + az * bz
         if n_axes == 1:
-            for k in range(jacobian.shape[1]):
-                along = ax * jacobian[3, k] + ay * jacobian[4, k] + az * jacobian[5, k]
-                jacobian[3, k] -= along * ax
-                jacobian[4, k] -= along * ay
-                jacobian[5, k] -= along * az
+            take_out_turns((ax, ay, az), jacobian)
     if n_axes == 3:
         wx, wy, wz, cosine = 0.5 * wx, 0.5 * wy, 0.5 * wz, 0.5 * (cosine - 1.0)
-    # From the sine of the angle to twice that of its half, which grows up to a half turn.
-    longer = 1.0 / math.sqrt(max(0.5 + 0.5 * cosine, 1e-6))
+    longer = half_turn_factor(cosine)
     return longer * wx, longer * wy, longer * wz
 
 
