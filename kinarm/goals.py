@@ -29,11 +29,6 @@ REST_PARTS = {
 GOAL_RESTS, REST_ERRORS = zip(*REST_PARTS.values(), strict=True)
 
 
-def finer(error: str) -> str:
-    """Name of the part that shows an error so that small ones stand out."""
-    return f"fine_{error}"
-
-
 ANGLE = {"must": "lie in [0, pi]", "holds": lambda value: 0 <= value <= math.pi}
 
 Point = tuple[float, float, float]

@@ -10,13 +10,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from kinarm.errors import LARGEST
-from kinarm.goals import REST_PARTS, finer
+from kinarm.goals import REST_PARTS
 from kinarm.kernels.compiling import Array, inlined
 from kinarm.kernels.elementary import sine_cosine
 from kinarm.kernels.goal_parts import (
-    FINE,
-    write_fine_offset,
-    write_fine_rest_error,
     write_goal,
     write_offset,
     write_resolved_rate,
@@ -125,30 +122,19 @@ UNIT = 1 + 1e-6
 def _rest_parts(
     kind: str, meaning: str, signs: tuple[int, ...], of: str = ONCE, unit: str = "1"
 ) -> Iterator[Part]:
-    """The rest of a kind of goals, its error, and that over its length plus `FINE`."""
+    """The rest of a kind of goals, and its error."""
     rest, missing = REST_PARTS[kind]
-    writers = {
-        rest: write_rest,
-        missing: write_rest_error,
-        finer(missing): write_fine_rest_error,
-    }
-    for number, (name, write) in enumerate(writers.items()):
-        error, fine = number > 0, number > 1
+    for name, write, error in ((rest, write_rest, False), (missing, write_rest_error, True)):
 
-        def bounds(
-            ranges: Ranges, error: bool = error, fine: bool = fine
-        ) -> tuple[Array | float, Array | float]:
-            if fine:
-                return -UNIT, UNIT
+        def bounds(ranges: Ranges, error: bool = error) -> tuple[Array | float, Array | float]:
             lower, upper = (ranges.lower, ranges.upper) if of == JOINTS else (-UNIT, UNIT)
             return (lower - upper, upper - lower) if error else (lower, upper)
 
         less = " of the goal less that of the tool (the nearer of two quaternions)"
-        finely = f", over the length of all plus {FINE:g}"
         yield Part(
             name=name,
-            meaning=meaning + (less if error else " of the goal") + (finely if fine else ""),
-            unit="1" if fine else unit,
+            meaning=meaning + (less if error else " of the goal"),
+            unit=unit,
             signs=signs,
             bounds=bounds,
             write=write,
@@ -174,15 +160,6 @@ OBSERVATION = (
         signs=POLAR,
         bounds=lambda ranges: (ranges.goal_lower - ranges.reach, ranges.goal_upper + ranges.reach),
         write=write_offset,
-        of_goal=True,
-    ),
-    Part(
-        name=finer("goal_minus_tool"),
-        meaning=f"goal minus tool point x, y, z, over its length plus {FINE:g} m",
-        unit="1",
-        signs=POLAR,
-        bounds=lambda _: (-UNIT, UNIT),
-        write=write_fine_offset,
         of_goal=True,
     ),
     Part(

@@ -6,7 +6,7 @@ from typing import Any, cast
 
 from kinarm._fields import OPTIONAL, Checked, init_fields
 from kinarm.errors import ProblemError, UnknownNameError
-from kinarm.goals import GOAL_RESTS, REST_ERRORS, REST_PARTS, finer
+from kinarm.goals import GOAL_RESTS, REST_ERRORS, REST_PARTS
 
 PAPER_PARTS = ("goal", "goal_minus_tool", "orientation", "position")
 """The paper's observation (section 3.2)."""
@@ -65,7 +65,6 @@ class Observation(Checked):
         """Names of the parts for a kind of goals."""
         given = (*PAPER_PARTS, *REST_PARTS.get(kind, ())) if self.parts is None else self.parts
         for name in given:
-            rest = name.removeprefix(finer(""))
-            if rest in (*GOAL_RESTS, *REST_ERRORS) and rest not in REST_PARTS.get(kind, ()):
+            if name in (*GOAL_RESTS, *REST_ERRORS) and name not in REST_PARTS.get(kind, ()):
                 raise ProblemError(f"the observation cannot have {name!r}: a goal is a {kind}")
         return given

@@ -15,10 +15,9 @@ from numpy.typing import ArrayLike
 from kinarm.arm import Arm
 from kinarm.contact_pairs import make_verdicts_reliable, start_anew
 from kinarm.errors import LARGEST
-from kinarm.goals import GOAL_RESTS, REST_ERRORS, finer
+from kinarm.goals import GOAL_RESTS, REST_ERRORS
 from kinarm.inverse_kinematics import approach_axis
 from kinarm.kernels.compiling import Array
-from kinarm.kernels.goal_parts import FINE
 from kinarm.kernels.inverse import DAMPING, LEAST_DAMPING
 from kinarm.observation_part import SLOTS
 from kinarm.reference_plant import ReferencePlant
@@ -215,7 +214,6 @@ class ReferenceSimulator:
         formulas: dict[str, Callable[[], Any]] = {
             "goal": lambda: goal[:3],
             "goal_minus_tool": lambda: offset,
-            finer("goal_minus_tool"): lambda: offset / (np.linalg.norm(offset) + FINE),
             "resolved_rate": lambda: self._resolved_rate(q, goal, pose),
             "orientation": lambda: self._quaternions(q),
             "position": lambda: positions,
@@ -229,9 +227,6 @@ class ReferenceSimulator:
             "obstacles": lambda: self._nearest(tool, layout.counts[SLOTS]),
             **dict.fromkeys(GOAL_RESTS, lambda: rest),
             **dict.fromkeys(REST_ERRORS, lambda: error),
-            **dict.fromkeys(
-                map(finer, REST_ERRORS), lambda: error / (np.linalg.norm(error) + FINE)
-            ),
         }
         near = layout.places.get("proximity")
         seen = np.concatenate([np.ravel(formulas[part.name]()) for part in layout.parts])

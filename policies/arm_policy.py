@@ -17,9 +17,6 @@ import numpy as np
 CONSTANT_BELOW = 1e-6
 """Inputs with a smaller standard deviation in training count as constant."""
 
-FINE = 0.02
-"""Error that a fine part of the observation shows as one half."""
-
 ACCURACY = 1e-9
 """Largest error of a command in the self-test [rad or m]."""
 
@@ -139,9 +136,6 @@ def observe(
         pairs = xp.stack([xp.sin(joints), xp.cos(joints)], -1)
         return xp.concatenate([pairs[..., k, :] for k in range(joints.shape[-1])], -1)
 
-    def refined(error: Any) -> Any:
-        return error / ((error * error).sum(-1)[..., None] ** 0.5 + FINE)
-
     def rotation_error() -> Any:
         reached = times(multiplier(xp, arm["tool_rotation"], FROM_RIGHT), quaternions[-1])
         same = times(rest[..., None, :], reached)
@@ -162,10 +156,6 @@ def observe(
         "joint_velocities": lambda: moved,
         "last_action": lambda: action,
         "time_left": lambda: time_left,
-        "fine_goal_minus_tool": lambda: refined(goal[..., :3] - tool),
-        "fine_direction_error": lambda: refined(parts["direction_error"]()),
-        "fine_rotation_error": lambda: refined(rotation_error()),
-        "fine_joints_error": lambda: refined(rest - joints),
     }
     return xp.concatenate([parts[name]() for name in names], -1)
 

@@ -7,7 +7,6 @@ from kinarm.errors import InvalidInputError, KinarmError
 from kinarm.evaluation.contestants import Contestant
 from kinarm.evaluation.replay.choosing import named_contestants
 from kinarm.evaluation.trials import TrialSet
-from kinarm.goals import REST_ERRORS, finer
 from kinarm.policies.export import contract_of
 from kinarm.policies.policy import Policy
 from kinarm.problem_options import say_choices
@@ -20,9 +19,6 @@ if TYPE_CHECKING:
 
 PLAYED = ("ppo-best-both", "ppo-precise-both", "ars-linear-both", "ars-paper-both")
 """Policies that a playground has by default."""
-
-NOT_IN_PAGES = (*map(finer, ("goal_minus_tool", *REST_ERRORS)),)
-"""Parts of observations that the scripts of pages do not compute."""
 
 OFFERED = 20
 """Trials that a page offers by default."""
@@ -64,9 +60,6 @@ def _player(contestant: Contestant, world: World, *, allow_other_arm: bool) -> d
 def page_policy(name: str, policy: Policy, world: World) -> dict[str, Any]:
     """A policy for a page: its contract, and its network with the normaliser folded in."""
     networks, contract = policy.networks(), contract_of(policy, world)
-    parts = [part["name"] for part in contract["observation"]["parts"]]
-    if unknown := [name for name in parts if name in NOT_IN_PAGES]:
-        raise InvalidInputError(f"pages do not know what it sees: {', '.join(unknown)}")
     parameters = networks.parameters[0].astype("<f8").tobytes()
     return {
         "name": name,

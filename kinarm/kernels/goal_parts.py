@@ -3,8 +3,6 @@
 One is resolved-rate control (Whitney 1969): the step of inverse kinematics from here to the goal.
 """
 
-import math
-
 from kinarm.kernels.compiling import inlined
 from kinarm.kernels.goals import CONFIGURATION, DIRECTION, POSE, nearer_sign, write_reached
 from kinarm.kernels.inverse import (
@@ -17,9 +15,6 @@ from kinarm.kernels.inverse import (
 from kinarm.kernels.kinematics import point_jacobian
 from kinarm.kernels.session import Session
 from kinarm.kernels.surroundings import Seen
-
-FINE = 0.02
-"""Error that a fine part shows as one half [m, rad or of quaternions]."""
 
 
 @inlined
@@ -47,25 +42,6 @@ def write_offset(session: Session, seen: Seen, start: int, count: int) -> None:
 
 
 @inlined
-def write_fine_offset(session: Session, seen: Seen, start: int, count: int) -> None:
-    """The same over its length plus `FINE`."""
-    write_offset(session, seen, start, count)
-    _refine(session, start, 3)
-
-
-@inlined
-def _refine(session: Session, start: int, n: int) -> None:
-    """Divide n entries by their length plus `FINE`, so that small ones show."""
-    observation = session.block.observation
-    squares = 0.0 * observation[0, start]
-    for i in range(n):
-        squares += observation[0, start + i] * observation[0, start + i]
-    scale = 1.0 / (math.sqrt(squares) + FINE)
-    for i in range(n):
-        observation[0, start + i] *= scale
-
-
-@inlined
 def write_rest(session: Session, seen: Seen, start: int, count: int) -> None:
     """What a goal has beside its position."""
     for i in range(session.block.goal.shape[1] - 3):
@@ -83,13 +59,6 @@ def write_rest_error(session: Session, seen: Seen, start: int, count: int) -> No
         for i in range(3, block.goal.shape[1]):
             missing = seen.goal[0, i] - sign * reached[0, i]
             block.observation[0, start + i - 3] = missing
-
-
-@inlined
-def write_fine_rest_error(session: Session, seen: Seen, start: int, count: int) -> None:
-    """The same over its length plus `FINE`."""
-    write_rest_error(session, seen, start, count)
-    _refine(session, start, session.block.goal.shape[1] - 3)
 
 
 @inlined

@@ -219,17 +219,14 @@ class TestPlayground:
         assert not (tmp_path / "made.html").exists()
 
     def test_policies_that_differ(self, replay, tmp_path):
-        """A part that pages do not know, bodies that are seen, and another arm."""
+        """Bodies that are seen, and another arm."""
         both = ReachProblem.load("both")
         for name, changed in (
-            ("fine", {"observation": ["goal", "fine_goal_minus_tool"]}),
             ("near", {"observation": ["goal", "proximity"]}),
             ("flange", {"arm": "paper_flange"}),
         ):
             policy_for(both.replace(**changed)).save(tmp_path / f"{name}.npz")
-        fine, near, flange = (tmp_path / f"{name}.npz" for name in ("fine", "near", "flange"))
-        said = "'fine' does not run here: pages do not know what it sees: fine_goal_minus_tool"
-        check_refused(replay("--play", PLAYED[0], fine), said)
+        near, flange = (tmp_path / f"{name}.npz" for name in ("near", "flange"))
         check_refused(replay("--play", near), "'near' does not run here: the policy sees proximity")
         said = "'flange' does not run here: the policy was trained for arm 'paper_flange', not for"
         check_refused(replay("--play", PLAYED[0], flange), said)

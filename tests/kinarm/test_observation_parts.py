@@ -14,7 +14,7 @@ from kinarm import Observation, Plant, ReachProblem, Simulator
 from kinarm.bodies import Body, RandomBodies
 from kinarm.body_motion import BodyMotion
 from kinarm.errors import InvalidInputError, KinarmError
-from kinarm.goals import GOAL_RESTS, REST_ERRORS, finer
+from kinarm.goals import GOAL_RESTS, REST_ERRORS
 from kinarm.kernels.surroundings import NEAR
 from kinarm.networks import Layer, Networks
 from kinarm.observation import OBSERVATION
@@ -22,7 +22,7 @@ from kinarm.reference import ReferenceSimulator
 from kinarm.scene import Scene
 
 BOTH = ReachProblem.load("both")
-OF_RESTS = (*GOAL_RESTS, *REST_ERRORS, *map(finer, REST_ERRORS))
+OF_RESTS = (*GOAL_RESTS, *REST_ERRORS)
 ALL = tuple(part.name for part in OBSERVATION if part.name not in OF_RESTS)
 FALLING = RandomBodies(
     name="it",

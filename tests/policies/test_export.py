@@ -16,9 +16,7 @@ from random_policies import policy_for, sliding
 from kinarm import ReachProblem, Scene, Simulator
 from kinarm.clearance import random_configurations
 from kinarm.errors import ArmError, InvalidInputError, OutputError
-from kinarm.goals import finer
 from kinarm.observation import OBSERVATION
-from kinarm.observation_choice import Observation
 from kinarm.policies import Policy, export_policy, load_policy
 from kinarm.policies.arm_policy import ArmPolicy, self_test
 from kinarm.policies.mirror import problem_mirror
@@ -119,10 +117,7 @@ def test_memory(observation, plant, tmp_path):
 
 @pytest.mark.parametrize("kind", ["direction", "pose", "configuration"])
 def test_goals_beyond_points(kind, tmp_path):
-    seen = Observation().names(kind)
-    fine = [finer("goal_minus_tool"), finer(seen[-1])]
-    problem = ReachProblem.load("both").replace(goal={"kind": kind}, observation=[*seen, *fine])
-    policy = policy_for(problem)
+    policy = policy_for(ReachProblem.load("both").replace(goal={"kind": kind}))
     export_policy(policy, tmp_path / "out", onnx=False)
     check_one_step(tmp_path / "out", policy, 2000)
 
