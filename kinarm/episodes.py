@@ -93,6 +93,9 @@ class Control(NamedTuple):
         Reflection of goals on the left for the networks, if any.
     side : int
         Entry of the observation that is positive for goals on the left.
+    rates : int
+        First entry of ``resolved_rate``, to which outputs of the networks are added as
+        far as there is to go; -1 if outputs are the actions.
     actions : ndarray, shape (n_episodes, n_steps, n_actuated)
         The table; one step serves every step.
     """
@@ -104,6 +107,7 @@ class Control(NamedTuple):
     observation_signs: Array = np.zeros(0)
     action_signs: Array = np.zeros(0)
     side: int = 0
+    rates: int = -1
     actions: Array = np.zeros((0, 0, 0))
 
 

@@ -106,11 +106,14 @@ class Networks:
         ``"silu"``; by default tanh between layers, none after the last.
     mirror : Mirror or None
         Reflection of goals on the left, and of actions; None for no reflection.
+    rates : int
+        First entry of ``resolved_rate``, to which outputs are added; see `Control`.
     """
 
     layers: tuple[Layer, ...]
     activations: tuple[Activation, ...] = ()
     mirror: Mirror | None = None
+    rates: int = -1
 
     def __post_init__(self) -> None:
         if not self.layers:
@@ -179,7 +182,7 @@ class Networks:
             if self.mirror is None
             else (tuple(np.ravel(part).tolist()) for part in self.mirror[:3])
         )
-        return self.widths, self.activations, tuple(signs)
+        return self.widths, self.activations, tuple(signs), self.rates
 
 
 def split_parameters(parameters: Array, widths: Sequence[int]) -> Iterator[Layer]:
@@ -246,6 +249,7 @@ def network_control(
         weights=networks.parameters,
         policy=index.astype(np.int64),
         activations=np.array([[*ACTIVATIONS].index(name) for name in networks.activations]),
+        rates=networks.rates,
     )
     if networks.mirror is None:
         return control

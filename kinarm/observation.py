@@ -165,8 +165,8 @@ OBSERVATION = (
     Part(
         name="resolved_rate",
         meaning=(
-            "action of resolved-rate control: a damped Newton step to the goal, blind to contact, "
-            "for each actuated joint, shortened as a whole to 1 at most"
+            "action of resolved-rate control: a damped Newton step from the commanded joints to "
+            "the goal, blind to contact, for each actuated joint, shortened as a whole to 1 at most"
         ),
         unit="1",
         signs=(0,),

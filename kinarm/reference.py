@@ -214,7 +214,7 @@ class ReferenceSimulator:
         formulas: dict[str, Callable[[], Any]] = {
             "goal": lambda: goal[:3],
             "goal_minus_tool": lambda: offset,
-            "resolved_rate": lambda: self._resolved_rate(q, goal, pose),
+            "resolved_rate": lambda: self._resolved_rate(now.commanded, goal),
             "orientation": lambda: self._quaternions(q),
             "position": lambda: positions,
             "joint_positions": lambda: q,
@@ -251,16 +251,18 @@ class ReferenceSimulator:
         rows = [row for _, row in sorted(found, key=lambda each: each[0])[:slots]]
         return np.array([*rows, *[np.zeros(12)] * (slots - len(rows))])
 
-    def _resolved_rate(self, q: Array, goal: Array, pose: pin.SE3) -> Array:
+    def _resolved_rate(self, q: Array, goal: Array) -> Array:
         """Damped Newton step to the goal, by Pinocchio's Jacobian."""
+        model, data = self.arm.model, self.arm.model.createData()
+        pin.framesForwardKinematics(model, data, q)
         limit, kind, rest = self._world.rules.step_limit, self.task.goal.kind, goal[3:]
-        frame = self.arm.model.getFrameId(self.arm.tool_frame, pin.FrameType.BODY)
-        seen_from = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
-        jacobian = pin.computeFrameJacobian(self.arm.model, self._data, q, frame, seen_from)
+        frame = model.getFrameId(self.arm.tool_frame, pin.FrameType.BODY)
+        pose, seen_from = data.oMf[frame], pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
+        jacobian = pin.computeFrameJacobian(model, data, q, frame, seen_from)
         moved, turned = jacobian[:3, : len(limit)], jacobian[3:, : len(limit)]
         error = goal[:3] - pose.translation
         if kind == "direction":
-            reached = self._data.oMi[self.arm.n_joints].rotation @ approach_axis(self.arm)
+            reached = data.oMi[self.arm.n_joints].rotation @ approach_axis(self.arm)
             longer = 1 / np.sqrt(max(0.5 + 0.5 * (reached @ rest), 1e-6))
             error = np.concatenate([error, longer * np.cross(reached, rest)])
             moved = np.vstack([moved, turned - np.outer(reached, reached @ turned)])

@@ -30,16 +30,20 @@ def choose_action(xp: Any, policy: Any, functions: list[str], side: int | None, 
     """Fractions of the velocity limits in [-1, 1], for observations, shape (..., n_observations).
 
     Takes the arrays of policy.npz, the layers' functions, and the entry of the goal's y, by which
-    a policy with a mirror tells the left, else None.
+    a policy with a mirror tells the left, else None. To the entries ``rates`` a residual policy
+    adds, by the longest of them.
     """
     left = None if side is None else x[..., side : side + 1] > 0
     if left is not None:
         x = xp.where(left, x * policy["mirror_observations"], x)
+    rates = x[..., policy["rates"]] if "rates" in policy else None
     constant = policy["std"] < CONSTANT_BELOW
     scale = xp.where(constant, 0.0, 1.0 / xp.where(constant, 1.0, policy["std"]))
     x = (x - policy["mean"]) * scale
     for k, name in enumerate(functions):
         x = activated(xp, name, x @ policy[f"weights_{k}"].T + policy[f"bias_{k}"])
+    if rates is not None:
+        x = rates + xp.amax(xp.abs(rates), -1)[..., None] * x
     action = xp.clip(x, -1.0, 1.0)
     return action if left is None else xp.where(left, action * policy["mirror_actions"], action)
 

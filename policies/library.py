@@ -10,6 +10,7 @@ import numpy as np
 
 from kinarm._files import absolute, is_file, is_folder, shipped_files
 from kinarm.errors import InvalidInputError, UnknownNameError
+from kinarm.observation_layout import ObservationLayout
 from kinarm.policies.normalizer import Normalizer
 from kinarm.policies.policy import Policy
 from kinarm.policies.training import CHECKPOINT
@@ -115,6 +116,12 @@ def models_in(path: Path) -> list[Path]:
 def _in_order(paths: Iterable[Path]) -> list[Path]:
     """Paths in the order of the numbers in their names."""
     return sorted(paths, key=lambda path: re.sub(r"\d+", lambda n: n[0].rjust(20, "0"), path.name))
+
+
+def layer_widths(problem: ReachProblem, hidden: Sequence[int] = ()) -> tuple[int, ...]:
+    """Widths of a policy's layers, from the observation to the action."""
+    arm = problem.load_arm()
+    return (ObservationLayout.of(problem, arm).size, *hidden, arm.n_actuated)
 
 
 def starting_policy(name_or_file: str, widths: Sequence[int]) -> Policy:

@@ -1,6 +1,6 @@
 """The class of all trained policies, and its file."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import chain, count
@@ -13,11 +13,12 @@ from numpy.typing import ArrayLike, NDArray
 from kinarm._files import Archive, load_archive, reading, save_archive, write_atomically
 from kinarm.arm import Arm
 from kinarm.errors import InvalidInputError, PolicyFileError, finite_array
-from kinarm.networks import ACTIVATIONS, Activation, Mirror, Networks, checked_activations
+from kinarm.networks import Activation, Mirror, Networks, checked_activations
 from kinarm.networks import Layer as Layer
 from kinarm.observation_choice import Observation
 from kinarm.observation_layout import ObservationLayout, observation_layout
-from kinarm.policies.normalizer import fold_normalizer, input_scale
+from kinarm.policies.arm_policy import choose_action
+from kinarm.policies.normalizer import fold_normalizer
 from kinarm.policies.provenance import Provenance
 from kinarm.problem import ProblemLike, ReachProblem
 
@@ -46,13 +47,14 @@ class Policy:
     provenance : Provenance
         Where it comes from, and its problem.
     activations : tuple of str
-        Function after each layer, the last one before the clip: ``"linear"``,
-        ``"tanh"``, ``"relu"``, ``"hardtanh"``, ``"elu"``, ``"leaky_relu"`` or
-        ``"silu"``; by default tanh between the layers and none after the last.
+        Function after each layer, the last one before the clip, as for
+        `kinarm.networks.Networks`.
     mirror : Mirror, optional
         Reflection in which it sees goals on the left, and acts.
     shield : bool
         Whether a simulator replaces its steps that would touch; see `shielded`.
+    residual : bool
+        Whether outputs are added to ``resolved_rate``; see `PPOConfig`.
     """
 
     mean: NDArray[np.float64]
@@ -62,6 +64,7 @@ class Policy:
     activations: tuple[Activation, ...] = ()
     mirror: Mirror | None = None
     shield: bool = False
+    residual: bool = False
 
     def __post_init__(self) -> None:
         if not self.layers:
@@ -69,6 +72,8 @@ class Policy:
         activations = checked_activations(self.activations, len(self.layers))
         mean = finite_array("mean", self.mean, (None,))
         std = finite_array("std", self.std, mean.shape)
+        if self.residual and "resolved_rate" not in self.layout.places:
+            raise InvalidInputError("a residual policy needs to see 'resolved_rate'")
         if (std < 0).any():
             raise InvalidInputError("std must not be negative")
         layers, width = [], len(mean)
@@ -132,17 +137,10 @@ class Policy:
         """
         given = np.asarray(observations, dtype=float)
         shape = (self.n_observations,) if given.ndim == 1 else (None, self.n_observations)
-        x = np.atleast_2d(finite_array("observations", given, shape))
-        left = np.zeros(len(x), dtype=bool)
-        if self.mirror is not None:
-            left, x = self.mirror.on_the_left(x), self.mirror.from_the_right(x)
-        x = (x - self.mean) * input_scale(self.std)
-        for layer, activation in zip(self.layers, self.activations, strict=True):
-            x = ACTIVATIONS[activation](x @ layer.weights.T + layer.bias)
-        actions = np.clip(x, -1.0, 1.0)
-        if self.mirror is not None:
-            actions = np.where(left[:, None], actions * self.mirror.actions, actions)
-        return actions[0] if given.ndim == 1 else actions
+        x = finite_array("observations", given, shape)
+        side = None if self.mirror is None else self.mirror.side
+        actions: NDArray[np.float64] = choose_action(np, self.arrays, [*self.activations], side, x)
+        return actions
 
     def predict(
         self,
@@ -173,7 +171,20 @@ class Policy:
     def _networks(self) -> Networks:
         first = Layer(*fold_normalizer(*self.layers[0], self.mean, self.std))
         batches = (Layer(weights[None], bias[None]) for weights, bias in (first, *self.layers[1:]))
-        return Networks(tuple(batches), self.activations, self.mirror)
+        first_rate = int(self.arrays["rates"][0]) if self.residual else -1
+        return Networks(tuple(batches), self.activations, self.mirror, first_rate)
+
+    @cached_property
+    def arrays(self) -> dict[str, NDArray[Any]]:
+        """Statistics, layers and the rest by the names that they have in files."""
+        arrays: dict[str, NDArray[Any]] = {"mean": self.mean, "std": self.std}
+        for number, layer in enumerate(self.layers):
+            arrays |= {f"weights_{number}": layer.weights, f"bias_{number}": layer.bias}
+        if self.residual:
+            arrays["rates"] = np.arange(self.layout.size)[self.layout.places["resolved_rate"]]
+        if self.mirror is not None:
+            arrays |= {f"mirror_{name}": getattr(self.mirror, name) for name in SIGNS}
+        return arrays
 
     @classmethod
     def from_sb3(
@@ -249,7 +260,7 @@ class Policy:
         """Make a module of PyTorch that maps observations to actions, in double precision."""
         from kinarm.policies.conversion.to_torch import network_module
 
-        return network_module(policy_content(self).arrays, self.activations, self.mirror)
+        return network_module(self.arrays, self.activations, self.mirror)
 
     def to_onnx(self, path: str | Path) -> None:
         """Write the network in ONNX, from ``observation`` to ``action`` (extra ``export``).
@@ -300,12 +311,6 @@ class Policy:
             return policy_of_content(content, repr(str(path)))
 
 
-def layer_widths(problem: ReachProblem, hidden: Sequence[int] = ()) -> tuple[int, ...]:
-    """Widths of a policy's layers, from the observation to the action."""
-    arm = problem.load_arm()
-    return (ObservationLayout.of(problem, arm).size, *hidden, arm.n_actuated)
-
-
 def policy_content(policy: Policy) -> Archive:
     """A policy as files hold it, for `policy_of_content`."""
     header = {
@@ -314,12 +319,7 @@ def policy_content(policy: Policy) -> Archive:
         "activations": list(policy.activations),
         **({"shield": True} if policy.shield else {}),
     }
-    arrays = {"mean": policy.mean, "std": policy.std}
-    for number, layer in enumerate(policy.layers):
-        arrays |= {f"weights_{number}": layer.weights, f"bias_{number}": layer.bias}
-    if policy.mirror is not None:
-        arrays |= {f"mirror_{name}": getattr(policy.mirror, name) for name in SIGNS}
-    return Archive(header, arrays)
+    return Archive(header, policy.arrays)
 
 
 def policy_of_content(content: Archive, where: str) -> Policy:
@@ -342,6 +342,7 @@ def policy_of_content(content: Archive, where: str) -> Policy:
         provenance=provenance,
         activations=tuple(header["activations"]),
         shield=header.get("shield", False),
+        residual="rates" in arrays,
     )
     signs = [f"mirror_{name}" for name in SIGNS]
     if not any(name in arrays for name in signs):

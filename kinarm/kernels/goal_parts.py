@@ -12,7 +12,8 @@ from kinarm.kernels.inverse import (
     half_turn_factor,
     take_out_turns,
 )
-from kinarm.kernels.kinematics import point_jacobian
+from kinarm.kernels.kinematics import forward_kinematics, point_jacobian, to_world
+from kinarm.kernels.plant import COMMAND
 from kinarm.kernels.session import Session
 from kinarm.kernels.surroundings import Seen
 
@@ -63,9 +64,29 @@ def write_rest_error(session: Session, seen: Seen, start: int, count: int) -> No
 
 @inlined
 def write_resolved_rate(session: Session, seen: Seen, start: int, count: int) -> None:
-    """Damped Newton step of each actuated joint to the goal, by its limit, at most 1 as a whole."""
+    """Damped Newton step of each actuated joint to the goal, by its limit, at most 1 as a whole.
+
+    It starts from joint positions as they were commanded, to which a step is added.
+    """
     if session.block.newton.shape[0] > 0:
-        _resolve(session, seen, start, count)
+        if session.block.plant.shape[0] > 0:
+            _resolve(session, _as_commanded(session, seen), start, count)
+        else:
+            _resolve(session, seen, start, count)
+
+
+@inlined
+def _as_commanded(session: Session, seen: Seen) -> Seen:
+    """What would be seen if joints were where they are told to be."""
+    chain, block = session.chain, session.block
+    n_joints, tool = block.q.shape[1], chain.tool
+    for joint in range(n_joints):
+        block.told[0, joint] = seen.joints[0, joint]
+    for axis in range(block.drive.shape[1]):
+        block.told[0, axis] = block.drive[COMMAND, axis]
+    forward_kinematics(chain, block.told, 0, block.told_poses)
+    point = to_world(block.told_poses, n_joints, tool[0], tool[1], tool[2])
+    return Seen(seen.poses, block.told_poses, point, seen.goal, block.told, seen.before)
 
 
 @inlined

@@ -98,6 +98,19 @@ def act(
         action[0, j] = hidden[(n_layers - 1) % 2, j]
 
 
+@helper
+def add_to_rates(seen: Array, rates: int, action: Array) -> None:
+    """Add outputs of a network to the step of resolved-rate control, by its longest entry.
+
+    So they fade within the last step to the goal, and cannot keep the arm from it.
+    """
+    longest = 0.0 * seen[0, rates]
+    for axis in range(action.shape[1]):
+        longest = max(longest, abs(seen[0, rates + axis]))
+    for axis in range(action.shape[1]):
+        action[0, axis] = seen[0, rates + axis] + longest * action[0, axis]
+
+
 @inlined
 def shared_policy(n_episodes: int, control: Control) -> int:
     """Policy of all episodes; -1 if there are several, 0 with a table."""
@@ -136,6 +149,8 @@ def choose_actions(control: Control, shared: int, row: NDArray[np.int64], block:
             act(layers, activations, weights, seen, block.hidden, block.action)
         else:
             act(layers, activations, block.weights[0], seen, block.hidden, block.action)
+        if block.newton.shape[0] > 0 and control.rates >= 0:
+            add_to_rates(seen, control.rates, block.action)
     for axis in range(block.action.shape[1]):
         action = min(max(block.action[0, axis], -1.0), 1.0)
         if signs.shape[0] > 0:

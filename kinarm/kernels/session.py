@@ -106,7 +106,10 @@ def layouts(
         # Move of an axis (column) in the step, times itself and twice those before it, from the
         # first one (row) that counts [rad^2].
         "twist": (n_actuated, n_actuated),
-        # Errors of the goal, their Jacobian, work space, and the step that removes them.
+        # For a Newton step, joint positions as commanded and poses there, if a plant comes between;
+        # errors of the goal, their Jacobian, work space, and the step that removes them.
+        "told": (has_plant * (newton > 0), n_joints),
+        "told_poses": (has_plant * (newton > 0) * (n_joints + 1), Fixed(POSE)),
         "error": (Fixed(newton),),
         "jacobian": (Fixed(newton), n_actuated),
         "square": (Fixed(newton + 1 if newton else 0), Fixed(newton)),

@@ -21,10 +21,10 @@ from kinarm.policies.ars.networks import (
     perturbed_networks,
 )
 from kinarm.policies.learners import CurvePoint
-from kinarm.policies.library import starting_policy, statistics
+from kinarm.policies.library import layer_widths, starting_policy, statistics
 from kinarm.policies.mirror import problem_mirror
 from kinarm.policies.normalizer import Normalizer, input_scale
-from kinarm.policies.policy import Policy, layer_widths
+from kinarm.policies.policy import Policy
 from kinarm.policies.provenance import Provenance
 from kinarm.randomness import Stream, stream_generator
 from kinarm.simulator import Simulator

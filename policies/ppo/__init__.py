@@ -80,6 +80,10 @@ class PPOConfig(TrainingConfig):
         by default the task's.
     training_speed : float, optional
         Largest speed of the tool in those steps [m/s]; by default the task's.
+    residual : bool
+        Whether the network adds to resolved-rate control (Silver et al. 2018), which
+        the observation then shows: action = rate + longest entry of the rate x
+        output. The nearer the goal, the less it adds, so that it cannot miss it.
     symmetric : bool
         Whether the policy treats mirror images alike, if arm and obstacles are
         symmetric; it then learns from goals on the right and mirror images of
@@ -137,6 +141,7 @@ class PPOConfig(TrainingConfig):
     initial_tolerance: float | None = field(default=None, metadata={**POSITIVE, **OPTIONAL})
     training_hold: int | None = field(default=None, metadata={**MANY, **OPTIONAL})
     training_speed: float | None = field(default=None, metadata={**POSITIVE, **OPTIONAL})
+    residual: bool = field(default=False, metadata=OPTIONAL)
     symmetric: bool = False
     initial_start_spread: float = field(default=1.0, metadata=SHARE)
     initial_gamma: float | None = field(default=None, metadata=SHARE)
@@ -170,6 +175,10 @@ class PPOConfig(TrainingConfig):
         super().__post_init__()
         if not self.net_arch:
             raise InvalidInputError("net_arch must name at least one layer")
+        if self.residual:
+            task, seen = self.problem.task, self.problem.observation
+            parts = dict.fromkeys((*seen.names(task.goal.kind), "resolved_rate"))
+            object.__setattr__(self, "problem", self.problem.replace(observation=[*parts]))
         if self.replay_log_std is not None and not self.replay_share:
             raise InvalidInputError("replay_log_std needs a replay_share above 0")
         if self.replay_noise_steps is not None and self.replay_log_std is None:

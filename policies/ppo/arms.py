@@ -14,6 +14,8 @@ from kinarm.policies.ppo.kernels.layers import Numbers
 from kinarm.policies.ppo.kernels.update import Experience, choose
 from kinarm.policies.ppo.networks import ActorCritic
 
+Reals = NDArray[np.floating]
+
 
 class TrainingArms:
     """Arms stepped together, whose episodes are replaced when they end.
@@ -93,6 +95,16 @@ class TrainingArms:
 
     def _normalized(self, observations: NDArray[np.float64]) -> Numbers:
         return ((observations - self._mean) * self._scale).astype(np.float32)
+
+    def rates(self, observations: Reals) -> tuple[Reals, Reals]:
+        """What a residual policy adds to, shape (n, n_actions), and its factor, shape (n, 1).
+
+        Of other policies, zero and one.
+        """
+        if not self.config.residual:
+            return np.zeros((1, 1), dtype=np.float32), np.ones((1, 1), dtype=np.float32)
+        rates = observations[:, self.simulator.world.layout.places["resolved_rate"]]
+        return rates, np.abs(rates).max(axis=1, keepdims=True)
 
     def replaying(self) -> NDArray[np.bool_]:
         """Which arms have the noise of replays, shape (n_envs,)."""
@@ -175,10 +187,11 @@ def collect(
     scales, densities, rewards, going_on = (np.ones(shape, dtype=np.float32) for _ in range(4))
     for step in range(config.n_steps):
         observations[step] = seen = arms.observe()
+        rates, extent = arms.rates(arms.episodes.observation)
         noise = rng.standard_normal(actions[step].shape).astype(np.float32)
         outcome = actions[step], scales[step], densities[step]
         choose(networks.means(seen), log_std, noise, arms.replaying(), least, *outcome)
-        rewards[step], ended = arms.step(np.clip(actions[step], -1.0, 1.0))
+        rewards[step], ended = arms.step(np.clip(rates + extent * actions[step], -1.0, 1.0))
         going_on[step] = ~ended
     steps = np.repeat(np.arange(config.n_steps), [len(rows) for rows in arms.cut_short])
     flat = observations.reshape(-1, observations.shape[-1])

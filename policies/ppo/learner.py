@@ -13,9 +13,8 @@ from kinarm._parallel import available_threads
 from kinarm.errors import InvalidInputError, needed, whole_number
 from kinarm.failed_scenarios import FailedScenarios
 from kinarm.policies.learners import CurvePoint
-from kinarm.policies.library import starting_policy, statistics
+from kinarm.policies.library import layer_widths, starting_policy, statistics
 from kinarm.policies.normalizer import Normalizer
-from kinarm.policies.policy import layer_widths
 from kinarm.policies.ppo import EpisodeStates, PPOConfig, PPOState
 from kinarm.policies.ppo.arms import TrainingArms, collect
 from kinarm.policies.ppo.networks import ActorCritic, initial_parameters, split_parameters
@@ -27,6 +26,9 @@ IMITATING = "learning from the oracle's motions first"
 
 NORMALIZED_OVER = 10_000
 """Random starts whose observations the normaliser describes."""
+
+LEAST_EXTENT, LARGEST_OUTPUT = 0.05, 2.0
+"""Of what a residual network imitates: beyond them, it would learn the last steps alone."""
 
 RANDOM_STEPS = 8
 """Random steps before observations that tell of earlier ones."""
@@ -108,8 +110,11 @@ class PPOTraining:
         scenarios = arms.sample(rng, config.demonstrations)
         oracle = Oracle(arms.simulator.problem, threads=self.threads)
         shown = oracle.demonstrate(*scenarios)
+        rates, extent = arms.rates(shown.observations)
+        wanted = (shown.actions - rates) / np.maximum(extent, LEAST_EXTENT)
+        wanted = np.clip(wanted, -LARGEST_OUTPUT, LARGEST_OUTPUT)
         networks.load(state.parameters)
-        imitate(networks, (shown.observations, shown.actions), state.normalizer, rng, self.threads)
+        imitate(networks, (shown.observations, wanted), state.normalizer, rng, self.threads)
         return networks.gathered(networks.weights)
 
     def iterate(self, state: PPOState) -> PPOState:

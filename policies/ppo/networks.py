@@ -9,8 +9,9 @@ from numpy.typing import NDArray
 
 from kinarm._parallel import run_rows
 from kinarm.errors import InvalidInputError
+from kinarm.policies.library import layer_widths
 from kinarm.policies.mirror import problem_mirror
-from kinarm.policies.policy import Layer, Policy, layer_widths
+from kinarm.policies.policy import Layer, Policy
 from kinarm.policies.ppo import PPOConfig, PPOState
 from kinarm.policies.ppo.kernels.layers import BLOCK, Network, Numbers, evaluate, padded, transpose
 from kinarm.policies.provenance import Provenance
@@ -196,4 +197,5 @@ def actor_policy(config: PPOConfig, state: PPOState) -> Policy:
         layers=tuple(Layer(*affine) for affine in actor),
         provenance=Provenance.of("ppo", config, state.environment_steps),
         mirror=problem_mirror(config.problem) if config.symmetric else None,
+        residual=config.residual,
     )
