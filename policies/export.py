@@ -18,7 +18,7 @@ from kinarm.arm import Arm
 from kinarm.clearance import random_configurations
 from kinarm.errors import InvalidInputError, OutputError, PolicyFileError, finite_array
 from kinarm.kernels.compiling import Array
-from kinarm.policies import arm_policy
+from kinarm.policies import arm_policy, self_test
 from kinarm.policies.conversion.to_torch import command_module, onnx_model
 from kinarm.policies.policy import FORMAT_VERSION, Policy, policy_content
 from kinarm.world import World
@@ -28,6 +28,9 @@ REACHED = ("rotation_tolerance", "hold", "speed")
 
 WIRING = ("sign", "offset")
 """Of a joint in a contract: what the arm reads is sign * position + offset."""
+
+ALONE = (arm_policy.__file__, self_test.__file__)
+"""Files that run without kinarm."""
 
 VECTORS = 10
 """Self-test vectors of a folder."""
@@ -92,9 +95,9 @@ def export_policy(
     contract["policy"]["sha256"] = hashlib.sha256(packed.getvalue()).hexdigest()
     files = _onnx_files(policy, content.arrays, contract) if onnx else {}
     contract["onnx"] = [*files]
-    contract["digest"] = arm_policy.digest_of(contract)
+    contract["digest"] = self_test.digest_of(contract)
     files |= {
-        "arm_policy.py": Path(arm_policy.__file__).read_bytes(),
+        **{Path(path).name: Path(path).read_bytes() for path in ALONE},
         "policy.npz": packed.getvalue(),
         "README.md": _readme(contract).encode(),
         "contract.json": (json.dumps(contract, indent=1) + "\n").encode(),
@@ -127,8 +130,8 @@ def contract_of(
     """
     world = world.seen_as(policy.observation)
     problem, arm, layout, made = world.problem, world.arm, world.layout, policy.provenance
-    seen = [name for name in ("proximity", "obstacles", "resolved_rate") if name in layout.places]
-    if seen:
+    if layout.sees_bodies:
+        seen = [name for name in ("proximity", "obstacles") if name in layout.places]
         raise InvalidInputError(f"the policy sees {' and '.join(seen)}: it needs kinarm to run")
     signs, offsets = _wiring(arm, sign, offset)
     task, plant, dt, rules = problem.task, problem.plant, problem.stepping.time_step, world.rules
@@ -184,10 +187,10 @@ def contract_of(
         "shield": problem.stepping.shield,
         "resolution": 0.0 if isinstance(plant.resolution, tuple) else plant.resolution,
     }
-    return contract | {"self_test": _self_test(policy, world, contract)}
+    return contract | {"self_test": _vectors(policy, world, contract)}
 
 
-def _self_test(
+def _vectors(
     policy: Policy, world: World, contract: dict[str, Any]
 ) -> list[dict[str, list[float]]]:
     """Joint positions of arms at rest, goals, and kinarm's commands."""
@@ -234,7 +237,8 @@ def load_wiring(folder: Path) -> dict[str, Any]:
     PolicyFileError if it does not.
     """
     try:
-        wrong, arm = arm_policy.self_test(folder), arm_policy.ArmPolicy(folder).arm
+        runtime = arm_policy.ArmPolicy(folder)
+        wrong, arm = self_test.self_test(runtime), runtime.arm
     except (OSError, ValueError, KeyError, TypeError) as error:
         raise PolicyFileError(f"{str(folder)!r} is no exported folder: {error}") from error
     if wrong:

@@ -48,7 +48,7 @@ def _export(request: ExportRequest, _: str) -> None:
         sign=request.sign or None,
         offset=request.offset or None,
     )
-    print(f"written: {request.out}; python {request.out}/arm_policy.py tests it")
+    print(f"written: {request.out}; python {request.out}/self_test.py tests it")
 
 
 main = partial(run_request, "kinarm-export", ExportRequest, _export)

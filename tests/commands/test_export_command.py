@@ -14,12 +14,12 @@ def test_folder(run, tmp_path):
     out = tmp_path / "out"
     answer = run("kinarm-export", "ars-linear-both", "--out", out, "--no-onnx")
     assert (answer.status, answer.err) == (0, "")
-    assert answer.out == f"written: {out}; python {out}/arm_policy.py tests it\n"
-    names = {"arm_policy.py", "contract.json", "policy.npz", "README.md"}
+    assert answer.out == f"written: {out}; python {out}/self_test.py tests it\n"
+    names = {"arm_policy.py", "self_test.py", "contract.json", "policy.npz", "README.md"}
     assert {each.name for each in out.iterdir()} == names
     assert Policy.load(out / "policy.npz").problem == load_policy("ars-linear-both").problem
     done = subprocess.run(
-        [sys.executable, out / "arm_policy.py"], capture_output=True, text=True, check=False
+        [sys.executable, out / "self_test.py"], capture_output=True, text=True, check=False
     )
     assert (done.returncode, done.stdout) == (0, "passed\n")
 

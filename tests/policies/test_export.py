@@ -17,9 +17,11 @@ from kinarm import ReachProblem, Scene, Simulator
 from kinarm.clearance import random_configurations
 from kinarm.errors import ArmError, InvalidInputError, OutputError
 from kinarm.observation import OBSERVATION
+from kinarm.observation_choice import Observation
 from kinarm.policies import Policy, export_policy, load_policy
-from kinarm.policies.arm_policy import ArmPolicy, self_test
+from kinarm.policies.arm_policy import ArmPolicy
 from kinarm.policies.mirror import problem_mirror
+from kinarm.policies.self_test import self_test
 
 N, STEPS = 14_000, 24
 """Configurations that are drawn, of which 10,000 of the paper's arm touch nothing; and steps."""
@@ -72,7 +74,7 @@ def test_shipped_policies(name, tmp_path):
     policy = load_policy(name)
     assert policy.mirror is not None
     export_policy(policy, tmp_path / "out", onnx=False)
-    assert self_test(tmp_path / "out") == []
+    assert self_test(ArmPolicy(tmp_path / "out")) == []
     check_one_step(tmp_path / "out", policy)
     check_episodes(tmp_path / "out", policy)
 
@@ -86,7 +88,7 @@ def test_other_arms(arm, tmp_path, make_joint, write_robot):
     problem = ReachProblem.load("both").replace(arm=arm, scene=EMPTY)
     policy = policy_for(problem)
     export_policy(policy, tmp_path / "out", onnx=False)
-    assert self_test(tmp_path / "out") == []
+    assert self_test(ArmPolicy(tmp_path / "out")) == []
     check_one_step(tmp_path / "out", policy)
 
 
@@ -111,32 +113,40 @@ def test_memory(observation, plant, tmp_path):
     mirror = problem_mirror(problem) if observation == "joints" else None
     policy = policy_for(problem, mirror=mirror)
     export_policy(policy, tmp_path / "out", onnx=False)
-    assert self_test(tmp_path / "out") == []
+    assert self_test(ArmPolicy(tmp_path / "out")) == []
     check_episodes(tmp_path / "out", policy)
 
 
-@pytest.mark.parametrize("kind", ["direction", "pose", "configuration"])
-def test_goals_beyond_points(kind, tmp_path):
-    policy = policy_for(ReachProblem.load("both").replace(goal={"kind": kind}))
+@pytest.mark.parametrize("kind", ["position", "direction", "pose", "configuration"])
+def test_kinds_of_goals(kind, tmp_path):
+    """Policies add to resolved rates of each."""
+    shown = (*Observation().names(kind), "resolved_rate")
+    problem = ReachProblem.load("both").replace(goal={"kind": kind}, observation=shown)
+    policy = replace(policy_for(problem), residual=True)
     export_policy(policy, tmp_path / "out", onnx=False)
     check_one_step(tmp_path / "out", policy, 2000)
+
+
+@pytest.mark.parametrize("plant", PLANTS)
+def test_rates_start_from_commands(plant, tmp_path):
+    shown = (*Observation().names("position"), "resolved_rate")
+    problem = ReachProblem.load("both").replace(observation=shown, **PLANTS[plant])
+    policy = replace(policy_for(problem, mirror=problem_mirror(problem)), residual=True)
+    export_policy(policy, tmp_path / "out", onnx=False)
+    check_episodes(tmp_path / "out", policy)
 
 
 @pytest.mark.parametrize("activation", ["relu", "hardtanh", "elu", "leaky_relu", "silu"])
 def test_functions_of_layers(activation, tmp_path):
     policy = policy_for(ReachProblem.load("right"), activation=activation)
     export_policy(policy, tmp_path / "out", onnx=False)
-    assert self_test(tmp_path / "out") == []
+    assert self_test(ArmPolicy(tmp_path / "out")) == []
 
 
 def test_every_part_without_bodies_is_known():
     tree = ast.parse(Path(sys.modules[ArmPolicy.__module__].__file__).read_text())
     texts = {node.value for node in ast.walk(tree) if isinstance(node, ast.Constant)}
-    assert {part.name for part in OBSERVATION} - texts == {
-        "proximity",
-        "obstacles",
-        "resolved_rate",
-    }
+    assert {part.name for part in OBSERVATION} - texts == {"proximity", "obstacles"}
 
 
 @pytest.fixture(scope="module")
@@ -147,8 +157,8 @@ def exported(tmp_path_factory):
 
 
 class TestAlone:
-    def run(self, folder, *options):
-        command = [sys.executable, "-I", *options, str(folder / "arm_policy.py")]
+    def run(self, folder):
+        command = [sys.executable, "-s", str(folder / "self_test.py")]
         return subprocess.run(command, capture_output=True, text=True, check=False, cwd="/")
 
     def test_numpy_is_all_it_needs(self, exported):
@@ -161,10 +171,10 @@ numpy = types.SimpleNamespace(find_spec=lambda name, path=None, target=None: (
     ) if name == "numpy" else None))
 sys.meta_path.append(numpy)
 sys.path.insert(0, {str(exported)!r})
-import arm_policy
-assert arm_policy.self_test() == []
+import arm_policy, self_test
+assert self_test.self_test(arm_policy.ArmPolicy()) == []
 outside = {{name.partition(".")[0] for name in sys.modules}} - set(sys.stdlib_module_names)
-assert outside <= {{"numpy", "arm_policy", "__main__", "_distutils_hack"}}, outside
+assert outside <= {{"numpy", "arm_policy", "self_test", "__main__", "_distutils_hack"}}, outside
 assert importlib.util.find_spec("kinarm") is None
 """
         done = subprocess.run(
@@ -330,7 +340,7 @@ class TestONNX:
 
     def check(self, policy, folder):
         assert export_policy(policy, folder)["onnx"] == ["network.onnx", "policy.onnx"]
-        assert self_test(folder) == []
+        assert self_test(ArmPolicy(folder)) == []
         simulator = Simulator(policy.problem, threads=1)
         q, goals = states(simulator)
         command = ArmPolicy(folder).command(q, goals)
@@ -357,8 +367,10 @@ class TestONNX:
         self.check(policy_for(problem, activation="elu"), tmp_path / "out")
 
     def test_poses(self, tmp_path):
-        problem = ReachProblem.load("both").replace(goal={"kind": "pose"})
-        self.check(policy_for(problem, activation="silu"), tmp_path / "out")
+        shown = (*Observation().names("pose"), "resolved_rate")
+        problem = ReachProblem.load("both").replace(goal={"kind": "pose"}, observation=shown)
+        policy = policy_for(problem, activation="silu")
+        self.check(replace(policy, residual=True), tmp_path / "out")
 
     def test_model_of_stable_baselines3(self, tmp_path):
         self.check(model_of_stable_baselines3(), tmp_path / "out")
@@ -383,7 +395,7 @@ class TestSignsAndOffsets:
     """An arm that counts some joints backwards, and from elsewhere."""
 
     def test_commands_and_self_test(self, wired, exported):
-        assert self_test(wired) == []
+        assert self_test(ArmPolicy(wired)) == []
         sign, offset = (np.array(WIRING[name], dtype=float) for name in ("sign", "offset"))
         plain, theirs, q = ArmPolicy(exported), ArmPolicy(wired), np.full(6, 0.1)
         for _ in range(5):
@@ -397,7 +409,7 @@ class TestSignsAndOffsets:
         contract = json.loads(path.read_text())
         contract["joints"][4]["sign"] = 1.0
         path.write_text(json.dumps(contract))
-        assert len(self_test(tmp_path / "out")) > 1
+        assert len(self_test(ArmPolicy(tmp_path / "out"))) > 1
 
     def test_onnx(self, wired, tmp_path):
         for package in ("torch", "onnx"):
