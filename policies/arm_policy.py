@@ -29,8 +29,7 @@ def choose_action(xp: Any, policy: Any, functions: list[str], side: int | None, 
     """Fractions of the velocity limits in [-1, 1], for observations, shape (..., n_observations).
 
     Takes the arrays of policy.npz, the layers' functions, and the entry of the goal's y, by which
-    a policy with a mirror tells the left, else None. To the entries ``rates`` a residual policy
-    adds, by the longest of them.
+    a mirror tells the left, else None. A residual policy adds to ``rates``, by their longest.
     """
     left = None if side is None else x[..., side : side + 1] > 0
     if left is not None:
