@@ -9,7 +9,7 @@ PIP_INSTALL := $(BIN)/python -m pip install --quiet --disable-pip-version-check 
 MODULES := $(shell find kinarm policies evaluation data -name __pycache__ -prune -o -type f -print | sort | cksum | cut -d' ' -f1)
 INSTALLED = $(VENV)/.installed-$(1)-$(MODULES)
 
-.PHONY: eval test test-slow test-rare campaign mutants lint docs package clean
+.PHONY: eval test test-slow test-rare campaign mutants lint docs package aarch64 clean
 
 eval: $(call INSTALLED,core) ## evaluate all shipped policies on 200 trials a task
 	$(BIN)/kinarm-eval --trials 200
@@ -48,6 +48,10 @@ PYTHONS ?= python3.11 python3.12 python3.13
 
 package: $(call INSTALLED,package) ## build, check and install what is published, with all PYTHONS
 	$(BIN)/python tests/packaging/everywhere.py $(PYTHONS)
+
+aarch64: $(call INSTALLED,dev) ## compute the same on an emulated AArch64, and see what macOS lacks
+	$(BIN)/mypy --platform darwin
+	$(BIN)/python tests/packaging/aarch64.py
 
 clean: ## remove what the other targets made
 	rm -rf $(VENV) build dist *.egg-info .coverage .mypy_cache .pytest_cache .ruff_cache .hypothesis

@@ -2,6 +2,7 @@
 
 ``python tests/golden/digests.py`` prints them, ``--record`` keeps them in ``digests.json`` with the
 semantics of simulator and oracle that they belong to; under one version they stay as they are.
+``--bits`` prints those of all bits, by which machines compare.
 A digest of what a policy or settings lead to follows a hash of that policy or those settings, and
 may change with it: other policies ship and recipes are tuned without another version. Numbers are
 rounded to 8 decimals, far above what processors and C libraries differ by.
@@ -43,10 +44,10 @@ def digest(arrays: Iterable[object], decimals: int = 8) -> str:
     """Hash of numbers, rounded."""
     content = hashlib.sha256()
     for array in arrays:
-        numbers = np.asarray(array)
+        numbers = np.asarray(array, dtype=np.float64)
         content.update(str(numbers.shape).encode())
-        rounded = np.round(numbers.astype(np.float64), decimals) + 0.0
-        content.update(rounded.tobytes())
+        kept = numbers if "--bits" in sys.argv else np.round(numbers, decimals)
+        content.update((kept + 0.0).tobytes())
     return content.hexdigest()[:16]
 
 

@@ -8,8 +8,17 @@ import time
 import numpy as np
 import pytest
 
-from kinarm._parallel import run_rows, run_together
+from kinarm._parallel import available_threads, run_rows, run_together
 from kinarm.simulator import Simulator
+
+
+def test_processors_are_those_of_the_process_or_all(monkeypatch):
+    monkeypatch.setattr(os, "sched_getaffinity", lambda _: {2, 5}, raising=False)
+    assert available_threads() == 2
+    monkeypatch.delattr(os, "sched_getaffinity")  # as on macOS
+    assert available_threads() == os.cpu_count()
+    monkeypatch.setattr(os, "cpu_count", lambda: None)
+    assert available_threads() == 1
 
 
 @pytest.mark.parametrize("n", [1, 7, 1000])
