@@ -67,4 +67,5 @@ def page_policy(name: str, policy: Policy, world: World) -> dict[str, Any]:
         "widths": networks.widths,
         "parameters": base64.b64encode(parameters).decode(),
         "signs": networks.mirror and networks.mirror._asdict(),
+        "rates": networks.rates,
     }

@@ -80,3 +80,69 @@ function nearestSolution(simulator, { q, goal }) {
   }
   return nearest && { ...nearest, steps: nearest.steps + task.hold - 1 };
 }
+
+/* ---------- resolved-rate control; see `kinarm.kernels.goal_parts` ---------- */
+
+/** Solution of least squares with damping, J^T (J J^T + damping)^-1 e, for columns of J. */
+function dampedStep(columns, error, damping) {
+  const rows = [...error.keys()];
+  const square = rows.map((i) => rows.map((j) => columns.reduce((sum, column) => sum + column[i] * column[j], 0) + (i === j ? damping : 0)));
+  const solved = [...error];
+  for (const j of rows) {
+    const inverse = 1 / square[j][j];
+    for (const i of rows.slice(j + 1)) {
+      square[j][i] = square[i][j];
+      square[i][j] *= inverse;
+    }
+    for (const i of rows.slice(j + 1)) {
+      for (const k of rows.slice(j + 1, i + 1)) {
+        square[i][k] -= square[i][j] * square[j][k];
+      }
+      solved[i] -= square[i][j] * solved[j];
+    }
+    square[j][j] = inverse;
+  }
+  for (const i of rows.reverse()) {
+    solved[i] *= square[i][i];
+    for (let j = i + 1; j < rows.length; j++) {
+      solved[i] -= square[j][i] * solved[j];
+    }
+  }
+  return columns.map((column) => solved.reduce((sum, value, i) => sum + column[i] * value, 0));
+}
+
+const TURNS = {
+  position: () => [],
+  direction: (reached, wanted) => {
+    const longer = 1 / Math.sqrt(Math.max(0.5 + 0.5 * dot(reached, wanted), 1e-6));
+    return cross(reached, wanted).map((value) => longer * value);
+  },
+  pose: (reached, wanted) => {
+    const [, ...turn] = timesQuaternion(wanted, [reached[0], -reached[1], -reached[2], -reached[3]]);
+    const sign = reached.reduce((sum, value, k) => sum + value * wanted[k], 0) < 0 ? -2 : 2;
+    return turn.map((value) => sign * value);
+  },
+};
+
+/** Damped Newton step from commanded joints to the goal, by the steps' limits, at most 1 as a whole. */
+function resolvedRate(simulator, { q, drive, goal }) {
+  const { kinematics, step, task } = simulator;
+  const poses = kinematics.poses([...drive.command, ...q.slice(step.length)]);
+  const [tool, reached] = simulator.reached(poses);
+  const turn = TURNS[task.kind](reached, goal.slice(3));
+  const error = [...minus(goal, tool), ...turn];
+  const columns = step.map((_, k) => {
+    const { axis, slides } = kinematics.axes[k];
+    const along = turned(poses[k + 1], axis);
+    const moved = slides ? along : cross(along, minus(tool, poses[k + 1].slice(13)));
+    let turns = slides ? [0, 0, 0] : along;
+    if (task.kind === "direction") {
+      turns = turns.map((value, i) => value - dot(reached, turns) * reached[i]);
+    }
+    return turn.length ? [...moved, ...turns] : moved;
+  });
+  const damping = 0.1 * error.reduce((sum, value) => sum + value * value, 0) + 1e-12;
+  const action = dampedStep(columns, error, damping).map((value, k) => value / step[k]);
+  const longest = Math.max(1, ...action.map(Math.abs));
+  return action.map((value) => value / longest);
+}

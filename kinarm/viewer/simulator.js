@@ -21,8 +21,8 @@ const ACTIVATIONS = {
 
 /** A policy: its contract, as exported folders have it, and its network, normaliser folded in. */
 class Policy {
-  constructor({ contract, widths, parameters, signs }) {
-    Object.assign(this, { contract, widths, signs });
+  constructor({ contract, widths, parameters, signs, rates }) {
+    Object.assign(this, { contract, widths, signs, rates });
     const bytes = Uint8Array.from(atob(parameters), (letter) => letter.charCodeAt(0));
     this.parameters = new Float64Array(bytes.buffer);
     this.parts = contract.observation.parts.map(({ name }) => name);
@@ -32,7 +32,8 @@ class Policy {
   act(observation) {
     const { activations, mirror_side: side } = this.contract.policy;
     const reflected = side !== null && observation[side] > 0;
-    let values = reflected ? observation.map((value, i) => this.signs.observations[i] * value) : observation;
+    const seen = reflected ? observation.map((value, i) => this.signs.observations[i] * value) : observation;
+    let values = seen;
     let start = 0;
     activations.forEach((name, layer) => {
       const [n, m] = [this.widths[layer], this.widths[layer + 1]];
@@ -45,6 +46,11 @@ class Policy {
       values = sums.map(ACTIVATIONS[name]);
       start += (n + 1) * m;
     });
+    if (this.rates >= 0) { // outputs are added to resolved rates, by the longest of them
+      const rates = seen.slice(this.rates, this.rates + values.length);
+      const longest = Math.max(...rates.map(Math.abs));
+      values = values.map((value, k) => rates[k] + longest * value);
+    }
     return Array.from(values, (value, k) => clamp(value, -1, 1) * (reflected ? this.signs.actions[k] : 1));
   }
 }
@@ -145,6 +151,7 @@ class Simulator {
       joint_velocities: () => this.step.map((limit, k) => (joints[k] - state.before[k]) / limit),
       last_action: () => state.action,
       commanded: () => [...state.drive.command, ...joints.slice(this.step.length)],
+      resolved_rate: () => resolvedRate(this, state),
       time_left: () => [(this.task.horizon - Math.min(state.steps, this.task.horizon)) / this.task.horizon],
       goal_direction: rest, direction_error: () => restError,
       goal_rotation: rest, rotation_error: () => restError,
