@@ -7,19 +7,15 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
 
-import coal
 import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from kinarm._parallel import run_rows
 from kinarm.arm import Arm
 from kinarm.arm_specification import arm_names
 from kinarm.collision import ContactModel
 from kinarm.contact_pairs import TOUCH_AT_HOME, make_verdicts_reliable
-from kinarm.enclosures import enclosing_polytope
 from kinarm.errors import ProblemError
-from kinarm.kernels.closest import Bodies, closest_pairs
 from kinarm.kernels.compiling import Array
 from kinarm.scene import Scene
 
@@ -34,8 +30,7 @@ class Clearance(NamedTuple):
     ----------
     distance : ndarray, shape (...,)
         How far the closest pair is apart [m]; in contact, minus the way to come
-        apart. Within 2e-6 m of contact, only Coal's verdicts on capsules,
-        spheres and the ground surely agree.
+        apart. Those of hulls and cylinders are off by up to 2e-6 m.
     bodies : ndarray of str, shape (..., 2)
         Names of the two.
     points : ndarray, shape (..., 2, 3)
@@ -47,83 +42,19 @@ class Clearance(NamedTuple):
     points: Array
 
 
-def measure_clearance(
-    model: ContactModel, bodies: Bodies, configurations: Array, threads: int
-) -> Clearance:
-    """Find the closest tested pair of each configuration.
-
-    Kernels measure capsules, spheres, boxes, convex hulls and the ground, to
-    within 1e-10 m. Coal measures cylinders that may be closest, and overlapping
-    shapes, of capsules and spheres only overlaps deeper than their radii.
-
-    Parameters
-    ----------
-    model, bodies : ContactModel and Bodies
-        An arm in a scene, and its `flattened` geometry.
-    configurations : ndarray, shape (n, n_joints)
-        Joint positions [rad or m].
-    threads : int
-        Threads at most.
-    """
+def measure_clearance(model: ContactModel, configurations: Array) -> Clearance:
+    """Let Coal find the closest tested pair of each configuration, shape (n, n_joints)."""
     n, names = len(configurations), np.array(model.pair_names).reshape(-1, 2)
     distances, points = np.full(n, np.inf), np.full((n, 2, 3), np.nan)
     if not len(names):
         return Clearance(distances, np.full((n, 2), ""), points)
-    bounds, nearest = np.empty((n, len(names))), np.empty(n, dtype=np.int64)
-    arrays = (model.arm.chain, bodies, configurations, bounds, nearest, points)
-    run_rows(closest_pairs, n, 8 * n, threads, *arrays)
-    known = np.flatnonzero(nearest >= 0)
-    distances[known] = bounds[known, nearest[known]]
-    data, placed, _ = model.workspace
-    for row in np.flatnonzero(nearest < 0):
-        pin.updateGeometryPlacements(
-            model.arm.model, data, model.geometry, placed, configurations[row]
-        )
-        for pair in np.argsort(bounds[row], kind="stable"):
-            if bounds[row, pair] >= distances[row]:
-                break
-            result = pin.computeDistance(model.geometry, placed, int(pair))
-            if result.min_distance < distances[row]:
-                nearest[row], distances[row] = pair, result.min_distance
-                points[row] = result.getNearestPoint1(), result.getNearestPoint2()
+    nearest, (data, *_), placed = np.empty(n, dtype=np.int64), model.workspace, model.measuring
+    for row, q in enumerate(configurations):
+        pair = pin.computeDistances(model.arm.model, data, model.geometry, placed, q)
+        found = placed.distanceResults[pair]
+        nearest[row], distances[row] = pair, found.min_distance
+        points[row] = found.getNearestPoint1(), found.getNearestPoint2()
     return Clearance(distances, names[nearest], points)
-
-
-def flattened(geometry: pin.GeometryModel) -> Bodies:
-    """Bodies and pairs of a geometry model for the kernels."""
-    shapes = list(geometry.geometryObjects)
-    corners, rounding = [], []
-    for shape in shapes:
-        body, place = shape.geometry, shape.placement
-        if isinstance(body, coal.Halfspace):
-            normal = place.rotation @ body.n
-            corners.append(normal[None])
-            rounding.append(float(body.d + normal @ place.translation))
-        elif isinstance(body, coal.ConvexBase):
-            corners.append(np.array([place.act(point) for point in np.array(body.points())]))
-            rounding.append(0.0)
-        else:
-            around = enclosing_polytope(shape)
-            corners.append(around.corners)
-            rounding.append(float(around.rounding))
-    ends = np.cumsum([0, *map(len, corners)])
-    centres = [(each.min(axis=0) + each.max(axis=0)) / 2 for each in corners]
-    radii = [
-        np.linalg.norm(each - centre, axis=1).max() * (1 + 1e-12) + radius
-        for each, centre, radius in zip(corners, centres, rounding, strict=True)
-    ]
-    return Bodies(
-        link=np.array([shape.parentJoint for shape in shapes], dtype=np.int64),
-        span=np.stack([ends[:-1], ends[1:]], axis=1),
-        corners=np.ascontiguousarray(np.concatenate(corners)),
-        rounding=np.array(rounding),
-        flat=np.array([isinstance(shape.geometry, coal.Halfspace) for shape in shapes]),
-        exact=np.array([not isinstance(shape.geometry, coal.Cylinder) for shape in shapes]),
-        balls=np.column_stack([np.array(centres), np.array(radii)]),
-        pairs=np.array(
-            [(pair.first, pair.second) for pair in geometry.collisionPairs], dtype=np.int64
-        ).reshape(-1, 2),
-    )
 
 
 SAMPLES = 2000

@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from kinarm._parallel import available_threads, run_rows
 from kinarm.chain import Chain
-from kinarm.clearance import Clearance, flattened, measure_clearance
+from kinarm.clearance import Clearance, measure_clearance
 from kinarm.collision import ContactModel
 from kinarm.contact_shapes import PLANE, ContactShapes, unit_boxes
 from kinarm.episode_plants import EpisodePlants
@@ -19,7 +19,6 @@ from kinarm.errors import (
     whole_number,
 )
 from kinarm.goal_kinematics import GoalKinematics
-from kinarm.kernels.closest import Bodies
 from kinarm.kernels.compiling import Array
 from kinarm.kernels.records import recorded
 from kinarm.kernels.rollout import begin
@@ -95,7 +94,7 @@ class World(GoalKinematics, StepContact, WorldChanges):
 
     def __getstate__(self) -> dict[str, Any]:
         # A copy may get other rules or bodies, and needs its own work space.
-        own = ("records", "layout", "_bodies")
+        own = ("records", "layout")
         kept = {name: value for name, value in self.__dict__.items() if name not in own}
         return kept | {"_idle": []}
 
@@ -171,12 +170,10 @@ class World(GoalKinematics, StepContact, WorldChanges):
     def clearance(self, configurations: ArrayLike) -> Clearance:
         """Measure how far the closest of the tested pairs is apart, and where.
 
-        Takes configurations as `poses` does. Capsules, spheres, boxes, convex hulls and the ground
-        are measured to within 1e-10 m. Coal measures where a cylinder may be closest, and
-        overlaps, those of capsules and spheres if deeper than their radii.
+        Takes configurations as `poses` does.
         """
         q, one = one_or_many("configurations", configurations, (self.arm.n_joints,))
-        found = measure_clearance(self.contact_model, self._bodies, q, self.threads)
+        found = measure_clearance(self.contact_model, q)
         return Clearance(*(each[0] for each in found)) if one else found
 
     def in_contact(self, configurations: ArrayLike) -> NDArray[np.bool_]:
@@ -261,10 +258,6 @@ class World(GoalKinematics, StepContact, WorldChanges):
         n_proven = screen(first, last, *space, *arrays)
         self._idle.append(space)
         return n_proven
-
-    @cached_property
-    def _bodies(self) -> Bodies:
-        return flattened(self.contact_model.geometry)
 
     def _begun_at(self, configurations: ArrayLike, goals: ArrayLike, step: int = 0) -> Episodes:
         """Episodes that begin at configurations, in contact or not."""
