@@ -5,8 +5,7 @@ brackets, and colours linear red, green and blue.
 """
 
 import math
-from collections.abc import Callable, Sequence
-from functools import lru_cache
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -24,30 +23,28 @@ FILL, FILL_INTENSITY = 0xDCE8FF, 0.3
 SKY, GROUND, SKY_INTENSITY = 0xFFFFFF, 0xB9C0C8, 0.3
 """Light from the left and from the right, as on that page."""
 
-ROOM = (
-    (0x5C6066, (12, 12, 8), (0, 0, 2)),
-    (0xFFFFFF, (5, 2.4, 0.1), (1, -1, 5.4)),
-    (0xE8F0FF, (0.1, 6, 3), (-5.5, 0, 2.5)),
-    (0xFFF4E4, (6, 0.1, 2.4), (0, -5.6, 3)),
+ROOM = np.array(
+    [
+        (0.4112, 0.4256, 0.4476),
+        *((-0.0396, -0.0411, -0.0444), (-0.0473, -0.0435, -0.0381), (0.09, 0.0875, 0.0843)),
+        *((-0.0061, -0.0058, -0.0054), (-0.1253, -0.1166, -0.1038), (-0.0551, -0.0583, -0.065)),
+        *((0.0119, 0.0166, 0.0247), (0.0179, 0.0173, 0.0162)),
+    ]
 )
-"""Colours, sizes and centres [m] of reflected boxes: walls, then panels."""
+"""Light of that page's room from a direction: shares of 1; x, y, z; and xy, yz, zx, xx - yy,
+3 zz - 1, which fit its walls and bright panels best."""
+
+DULL = (2 / 3, 1 / 4)
+"""How far surfaces blur the second and third line of that where they scatter all light
+(Ramamoorthi and Hanrahan, 2001)."""
 
 SHADOW_REACH = 1.75
 """Half the extent of the shadow map, about the origin [m]."""
-
-DIRECTIONS = 4096
-"""Directions from which the room's light is summed up."""
-
-IRRADIANCE_NODES, REFLECTION_NODES = 17, 33
-"""Nodes along each side of the octahedral maps."""
 
 SHADOW_BIAS = 0.002
 """How much nearer the sun a shadow's cause must be [m]."""
 
 LOG_2 = math.log(2.0)
-
-Cell = tuple[int, int, float, float]
-"""Row and column in a map, and the shares of the next row and column."""
 
 
 class Materials(NamedTuple):
@@ -55,7 +52,7 @@ class Materials(NamedTuple):
 
     colour, emission (n, 3): reflected and emitted light.
     roughness, metalness (n,): in 0..1.
-    reflections (n, k, k, 3): octahedral maps of the room's light, blurred by such a mirror.
+    reflections (n, 9, 3): the room's light as `ROOM`, blurred by such a mirror.
     """
 
     colour: Array
@@ -70,7 +67,7 @@ class Lights(NamedTuple):
 
     directions, colours (2, 3): towards the sun, which casts shadows, and a second light from afar.
     sky, ground (3,): light from the left (y) and from the right, which fade into each other.
-    irradiance (n, n, 3): octahedral map of the room's light on surfaces that face a direction.
+    irradiance (9, 3): the same on surfaces that face a direction.
     sunward (3, 4): world to shadow map.
     shadow (n, n): how near the sun the last surface is that keeps it off.
     """
@@ -93,25 +90,13 @@ def unit(vector: Vector) -> Vector:
 
 
 @inlined
-def _octahedral(x: float, y: float, z: float, size: int) -> Cell:
-    """Cell of an octahedral map that a direction falls into."""
-    span = 1.0 / max(abs(x) + abs(y) + abs(z), 1e-12)
-    u, v = x * span, y * span
-    if z < 0.0:
-        u, v = (1.0 - abs(v)) * math.copysign(1.0, u), (1.0 - abs(u)) * math.copysign(1.0, v)
-    u, v = 0.5 * (u + 1.0) * (size - 1), 0.5 * (v + 1.0) * (size - 1)
-    column, row = min(int(u), size - 2), min(int(v), size - 2)
-    return row, column, v - row, u - column
-
-
-@inlined
-def _look_up(table: Array, cell: Cell, channel: int) -> float:
-    """Value of a map between its nodes."""
-    row, column, v, u = cell
-    upper = (1.0 - u) * table[row, column, channel] + u * table[row, column + 1, channel]
-    lower = (1.0 - u) * table[row + 1, column, channel] + u * table[row + 1, column + 1, channel]
-    value: float = (1.0 - v) * upper + v * lower
-    return value
+def _of_room(light: Array, direction: Vector, channel: int) -> float:
+    """Light of the room, as `ROOM`, that belongs to a direction."""
+    x, y, z = direction
+    value: float = light[0, channel]
+    value += x * light[1, channel] + y * light[2, channel] + z * light[3, channel]
+    value += x * y * light[4, channel] + y * z * light[5, channel] + z * x * light[6, channel]
+    return value + (x * x - y * y) * light[7, channel] + (3.0 * z * z - 1.0) * light[8, channel]
 
 
 @inlined
@@ -198,14 +183,14 @@ def light_up(
     slope = 1.04 - 0.572 * roughness - 1.04 * bend  # per mirrored light of a colour
     base = 0.022 * roughness - 0.04 + 1.04 * bend  # and of any
     lost = 1.0 - slope - base
-    # Where the maps of the room are looked up, and the two lights from afar.
-    around = _octahedral(x, y, z, lights.irradiance.shape[0])
-    table = materials.reflections[material]
-    mirrored = _octahedral(
-        (2.0 * along * x - view[0]) * (1.0 - alpha) + x * alpha,
-        (2.0 * along * y - view[1]) * (1.0 - alpha) + y * alpha,
-        (2.0 * along * z - view[2]) * (1.0 - alpha) + z * alpha,
-        table.shape[0],
+    # From where light is mirrored, and the two lights from afar.
+    reflections = materials.reflections[material]
+    mirrored = unit(
+        (
+            (2.0 * along * x - view[0]) * (1.0 - alpha) + x * alpha,
+            (2.0 * along * y - view[1]) * (1.0 - alpha) + y * alpha,
+            (2.0 * along * z - view[2]) * (1.0 - alpha) + z * alpha,
+        )
     )
     sun = _shine(lights, 0, normal, view, alpha * alpha, facing)
     fill = _shine(lights, 1, normal, view, alpha * alpha, facing)
@@ -216,12 +201,12 @@ def light_up(
         colour = materials.colour[material, channel]
         body = colour * (1.0 - metalness)
         mirror = 0.04 + (colour - 0.04) * metalness
-        room = _look_up(lights.irradiance, around, channel)
+        room = _of_room(lights.irradiance, normal, channel)
         once = mirror * slope + base
         mean = mirror + (1.0 - mirror) * 0.047619
         again = once * mean / (1.0 - lost * mean) * lost
         total = materials.emission[material, channel]
-        total += once * _look_up(table, mirrored, channel)
+        total += once * _of_room(reflections, mirrored, channel)
         total += room * (again + body * (1.0 - once - again))
         ground, sky = lights.ground[channel], lights.sky[channel]
         total += body * (ground + (0.5 + 0.5 * y) * (sky - ground))
@@ -247,7 +232,7 @@ def lit(finishes: Sequence[Finish], texels: int) -> tuple[Materials, Lights]:
         colours=np.array([sun, fill]),
         sky=SKY_INTENSITY * channels(SKY),
         ground=SKY_INTENSITY * channels(GROUND),
-        irradiance=irradiance_map(),
+        irradiance=_blurred(*DULL),
         sunward=np.column_stack([turn, (texels / 2, texels / 2, 0.0)]),
         shadow=np.empty((texels, texels), dtype=np.float32),
     )
@@ -256,70 +241,17 @@ def lit(finishes: Sequence[Finish], texels: int) -> tuple[Materials, Lights]:
         emission=np.zeros((len(finishes), 3)),
         roughness=np.array([finish.roughness for finish in finishes]),
         metalness=np.array([finish.metalness for finish in finishes]),
-        reflections=np.array([reflection_map(finish.roughness) for finish in finishes]),
+        reflections=np.array([_mirrored(finish.roughness) for finish in finishes]),
     )
     return materials, lights
 
 
-@lru_cache(maxsize=1)
-def irradiance_map() -> Array:
-    """Light of the room on surfaces that face a direction, shape (n, n, 3)."""
-    return _blurred(IRRADIANCE_NODES, lambda cosine: np.maximum(cosine, 0.0))
+def _blurred(second: float, third: float) -> Array:
+    """The room's light with two of its lines blurred, shape (9, 3)."""
+    return ROOM * np.repeat([1.0, second, third], (1, 3, 5))[:, None]
 
 
-@lru_cache(maxsize=64)
-def reflection_map(roughness: float) -> Array:
-    """Light of the room as surfaces of a roughness mirror it, shape (n, n, 3)."""
-    square = roughness**4
-
-    def lobe(cosine: Array) -> Array:
-        half = (1.0 + cosine) / 2  # squared cosine of half the angle
-        return np.maximum(cosine, 0) / (half * (square - 1) + 1) ** 2
-
-    return _blurred(REFLECTION_NODES, lobe)
-
-
-def _blurred(nodes: int, lobe: Callable[[Array], Array]) -> Array:
-    """Mean light of the room, weighted by a function of the cosine."""
-    directions = _even_directions()
-    radiance = _room_radiance(directions)
-    weights = lobe(_node_directions(nodes) @ directions.T)
-    mean: Array = (weights @ radiance) / weights.sum(axis=1, keepdims=True)
-    return mean.reshape(nodes, nodes, 3)
-
-
-def _even_directions() -> Array:
-    """Evenly spread unit vectors (Fibonacci's spiral), shape (n, 3)."""
-    number = np.arange(DIRECTIONS) + 0.5
-    z = 1 - 2 * number / DIRECTIONS
-    turn = np.pi * (1 + np.sqrt(5)) * number
-    across = np.sqrt(1 - z**2)
-    return np.column_stack([across * np.cos(turn), across * np.sin(turn), z])
-
-
-def _node_directions(nodes: int) -> Array:
-    """Unit vectors of an octahedral map's nodes by rows, shape (nodes ** 2, 3)."""
-    v, u = np.meshgrid(*[np.linspace(-1, 1, nodes)] * 2, indexing="ij")
-    z = 1 - np.abs(u) - np.abs(v)
-    side_u, side_v = np.copysign(1, u), np.copysign(1, v)
-    x = np.where(z < 0, (1 - np.abs(v)) * side_u, u)
-    y = np.where(z < 0, (1 - np.abs(u)) * side_v, v)
-    directions = np.column_stack([x.ravel(), y.ravel(), z.ravel()])
-    unit: Array = directions / np.linalg.norm(directions, axis=1, keepdims=True)
-    return unit
-
-
-def _room_radiance(directions: Array) -> Array:
-    """Colours of the boxes seen from the origin, shape (n, 3)."""
-    nearest = np.full(len(directions), np.inf)
-    colours = np.zeros((len(directions), 3))
-    with np.errstate(divide="ignore"):
-        inverse = 1 / directions
-    for colour, size, centre in ROOM:
-        low, high = (np.array(centre) + sign * np.array(size) / 2 for sign in (-1, 1))
-        ends = np.stack([low * inverse, high * inverse])
-        enter, leave = ends.min(axis=0).max(axis=1), ends.max(axis=0).min(axis=1)
-        distance = np.where(enter > 0, enter, leave)
-        seen = (leave >= enter) & (leave > 0) & (distance < nearest)
-        nearest[seen], colours[seen] = distance[seen], channels(colour)
-    return colours
+def _mirrored(roughness: float) -> Array:
+    """The room's light as surfaces of a roughness mirror it, shape (9, 3)."""
+    sharpness = min(1.27 - 0.66 * roughness, 1.0)  # fitted to GGX
+    return _blurred(sharpness, sharpness**3)
