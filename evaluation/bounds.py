@@ -1,32 +1,20 @@
 """Bounds of what any policy could do, kept in the user's cache folder."""
 
-import hashlib
-import os
-from contextlib import suppress
-from functools import cache
-from pathlib import Path
 from weakref import WeakKeyDictionary
 
 import numpy as np
 from numpy.typing import NDArray
 
 from kinarm import SEMANTICS
-from kinarm._files import cache_folder, check_folder, load_archive, save_archive
-from kinarm.errors import InvalidInputError, OutputError
+from kinarm._files import Arrays, cached_arrays
 from kinarm.evaluation.schemas import Count, Document, Share
 from kinarm.evaluation.statistics import Estimate
 from kinarm.evaluation.trials import TrialSet
 from kinarm.policies.oracle import ORACLE_SEMANTICS, Oracle, OracleSolutions, Progress
 from kinarm.policies.provenance import package_versions
 
-KEPT_BYTES = 256 * 2**20
-"""Largest total size of the files with kept bounds."""
-
 COMPUTING_PACKAGES = ("numpy", "numba", "pin", "coal")
 """Packages that solutions depend on."""
-
-ARCHIVE = ("bounds", 1)
-"""Kind and version of the files."""
 
 MOST_BOUNDED = 2000
 """Most trials that are bounded beside policies that face more, the first ones.
@@ -41,9 +29,7 @@ def oracle_bounds(trials: TrialSet, on_progress: Progress | None = None) -> Orac
     """Look up what the oracle knows about trials, or solve and keep it.
 
     Solutions are kept in the cache folder, under the hash of the trials and of
-    the oracle's version, and in memory as long as the trials are. An unreadable
-    file is replaced; where none can be written, nothing is kept. Beyond
-    ``KEPT_BYTES``, what was used least recently goes.
+    the oracle's version, and in memory as long as the trials are.
 
     Parameters
     ----------
@@ -54,46 +40,21 @@ def oracle_bounds(trials: TrialSet, on_progress: Progress | None = None) -> Orac
         are known.
     """
     if trials not in _known:
-        path = cache_folder() / f"oracle-{trials.digest}-{oracle_version()}.npz"
-        solutions = _load(path)
-        if solutions is None:
+
+        def solve() -> Arrays:
             oracle = Oracle(trials.simulator.problem)
-            solutions = oracle.solve_batch(trials.starts, trials.goals, on_progress=on_progress)
-            _save(path, solutions)
-        _known[trials] = solutions
+            return vars(oracle.solve_batch(trials.starts, trials.goals, on_progress=on_progress))
+
+        made_of = f"{trials.digest} {oracle_version()}".encode()
+        found = cached_arrays("oracle", 1, made_of, solve, compress=True)
+        _known[trials] = OracleSolutions(**found)
     return _known[trials]
 
 
-@cache
 def oracle_version() -> str:
-    """Hash of the versions that solutions depend on."""
+    """The versions that solutions depend on."""
     packages = package_versions()
-    versions = (ORACLE_SEMANTICS, SEMANTICS, *(packages[name] for name in COMPUTING_PACKAGES))
-    return hashlib.sha256(" ".join(versions).encode()).hexdigest()[:12]
-
-
-def _load(path: Path) -> OracleSolutions | None:
-    """Read solutions; None if there are none or they cannot be used."""
-    try:
-        solutions = OracleSolutions(**load_archive(path, *ARCHIVE, InvalidInputError).arrays)
-    except (InvalidInputError, TypeError):
-        return None
-    with suppress(OSError):
-        os.utime(path)
-    return solutions
-
-
-def _save(path: Path, solutions: OracleSolutions) -> None:
-    """Write solutions, if possible, and delete the least recently used."""
-    with suppress(OutputError, OSError):
-        check_folder(path.parent)
-        save_archive(path, *ARCHIVE, vars(solutions), {}, compress=True)
-        files = (*path.parent.glob("oracle-*.npz"), *path.parent.glob(".oracle-*.npz.*"))
-        total = 0
-        for each in sorted(files, key=lambda file: -file.stat().st_mtime_ns):
-            total += each.stat().st_size
-            if total > KEPT_BYTES and each != path:
-                each.unlink()
+    return " ".join([ORACLE_SEMANTICS, SEMANTICS, *(packages[each] for each in COMPUTING_PACKAGES)])
 
 
 class Unsolved(Document, frozen=True, kw_only=True):

@@ -33,6 +33,9 @@ KINDS = "biufU"
 CACHE_VARIABLE = "KINARM_CACHE"
 """Environment variable for another cache folder."""
 
+KEPT_BYTES = 256 * 2**20
+"""Largest total size of the cached files of a kind."""
+
 Arrays = Mapping[str, NDArray[Any]]
 
 
@@ -276,18 +279,33 @@ def cache_folder() -> Path:
 
 
 def cached_arrays(
-    kind: str, version: int, made_of: bytes, make: Callable[[], Mapping[str, ArrayLike]]
+    kind: str,
+    version: int,
+    made_of: bytes,
+    make: Callable[[], Mapping[str, ArrayLike]],
+    *,
+    compress: bool = False,
 ) -> Arrays:
     """Look arrays up in the cache, or make and keep them.
 
     They depend on what they are ``made_of`` alone; the version is raised when they change. A file
-    that is damaged is replaced; what cannot be written is not kept.
+    that is damaged is replaced; what cannot be written is not kept. Of a kind, beyond `KEPT_BYTES`
+    what was used least recently goes.
     """
     path = cache_folder() / f"{kind}-{hashlib.sha256(made_of).hexdigest()[:24]}.npz"
     with suppress(InvalidInputError):
-        return load_archive(path, kind, version, InvalidInputError).arrays
+        kept = load_archive(path, kind, version, InvalidInputError).arrays
+        with suppress(OSError):
+            os.utime(path)
+        return kept
     arrays = {name: np.asarray(array) for name, array in make().items()}
-    with suppress(OutputError):
+    with suppress(OutputError, OSError):
         check_folder(path.parent)
-        save_archive(path, kind, version, arrays, {})
+        save_archive(path, kind, version, arrays, {}, compress=compress)
+        files = (*path.parent.glob(f"{kind}-*.npz"), *path.parent.glob(f".{kind}-*.npz.*"))
+        total = 0
+        for each in sorted(files, key=lambda file: -file.stat().st_mtime_ns):
+            total += each.stat().st_size
+            if total > KEPT_BYTES and each != path:
+                each.unlink()
     return arrays

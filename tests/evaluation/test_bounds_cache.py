@@ -10,6 +10,7 @@ import pytest
 from oracle_calls import count_calls
 from trial_bounds import draw, same
 
+from kinarm import _files
 from kinarm.evaluation import bounds
 from kinarm.evaluation.bounds import oracle_bounds
 from kinarm.policies.provenance import package_versions
@@ -45,11 +46,11 @@ def test_a_file_that_cannot_be_used_is_replaced(folder, solutions, monkeypatch, 
 
 @pytest.mark.parametrize("package", bounds.COMPUTING_PACKAGES)
 def test_the_version_changes_with_the_packages_that_compute(monkeypatch, package):
-    before, installed = bounds.oracle_version.__wrapped__(), package_versions()
+    before, installed = bounds.oracle_version(), package_versions()
     monkeypatch.setattr(bounds, "package_versions", lambda: {**installed, package: "99"})
-    assert bounds.oracle_version.__wrapped__() != before
+    assert bounds.oracle_version() != before
     monkeypatch.setattr(bounds, "package_versions", lambda: {**installed, "torch": "99"})
-    assert bounds.oracle_version.__wrapped__() == before
+    assert bounds.oracle_version() == before
 
 
 def fill(folder: Path, *names: str, size: int = 1000) -> None:
@@ -70,7 +71,7 @@ class TestRoom:
 
     def test_the_least_recently_used_files_go_beyond_a_size(self, folder, monkeypatch):
         fill(folder, *(f"oracle-{name}-1.npz" for name in "abcd"), size=100_000)
-        monkeypatch.setattr(bounds, "KEPT_BYTES", 250_000)
+        monkeypatch.setattr(_files, "KEPT_BYTES", 250_000)
         oracle_bounds(draw())
         assert {f"oracle-{name}-1.npz" for name in "cd"} < names_in(folder)
         assert len(names_in(folder)) == 3
@@ -78,7 +79,7 @@ class TestRoom:
     def test_looking_up_is_use(self, folder, monkeypatch):
         oracle_bounds(draw())
         (first,) = names_in(folder)
-        monkeypatch.setattr(bounds, "KEPT_BYTES", 3 * (folder / first).stat().st_size)
+        monkeypatch.setattr(_files, "KEPT_BYTES", 3 * (folder / first).stat().st_size)
         os.utime(folder / first, (0, 0))
         fill(folder, "oracle-old-1.npz", size=2 * (folder / first).stat().st_size)
         oracle_bounds(draw())
@@ -87,7 +88,7 @@ class TestRoom:
         assert "oracle-old-1.npz" not in names_in(folder)
 
     def test_only_what_belongs_to_the_cache_goes(self, folder, monkeypatch):
-        monkeypatch.setattr(bounds, "KEPT_BYTES", 1)
+        monkeypatch.setattr(_files, "KEPT_BYTES", 1)
         abandoned = ".oracle-a-1.npz.x2f9k"
         fill(folder, abandoned, "notes.txt", "oracle.npz", "policy.npz", "oracle-mine.txt")
         oracle_bounds(draw())
