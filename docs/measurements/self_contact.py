@@ -9,8 +9,8 @@ import coal
 
 from kinarm import Arm, arm_names
 from kinarm.clearance import contact_on_bare_ground
+from kinarm.evaluation.arm_facts import SelfContact
 from kinarm.evaluation.report.templating import markdown_table
-from kinarm.evaluation.self_contact import SelfContact
 
 CONFIGURATIONS = 20_000
 

@@ -8,8 +8,8 @@ from kinarm.kernels.compiling import Array
 from kinarm.kernels.lanes import LANES
 from kinarm.kernels.records import recorded
 from kinarm.kernels.session import furnish, work_space
-from kinarm.motion_contact import first_share
 from kinarm.policies.planning.kernels.sweeping import sweep
+from kinarm.step_contact import first_share
 from kinarm.world import World
 
 BEND = 0.1

@@ -4,7 +4,7 @@ import numpy as np
 from configurations import contact_boundary, jittered, substeps
 
 from kinarm.collision import Step
-from kinarm.motion_contact import steps_in_contact
+from kinarm.step_contact import steps_in_contact
 
 
 def test_coal_is_asked_about_doubtful_configurations_up_to_the_first_contact(any_simulator):

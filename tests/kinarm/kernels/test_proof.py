@@ -15,10 +15,10 @@ from kinarm.collision import Step
 from kinarm.episodes import INTERVALS
 from kinarm.kernels.planes import DEPTH
 from kinarm.kernels.proof import MARGIN, SURE_FREEDOM, open_parts
-from kinarm.motion_contact import first_share, steps_in_contact
 from kinarm.problem import PROBLEMS
 from kinarm.scene import Scene
 from kinarm.simulator import Simulator
+from kinarm.step_contact import first_share, steps_in_contact
 
 AXES, TOP = ("0 0 1", "1 0 0"), 1.1
 """Slides, and the top of the slab below them [m]."""

@@ -9,10 +9,10 @@ from simulators import changed
 
 from kinarm.arm import Arm
 from kinarm.bodies import Body
-from kinarm.motion_contact import _distances
 from kinarm.problem import PROBLEMS
 from kinarm.scene import Scene
 from kinarm.simulator import Simulator
+from kinarm.step_contact import _distances
 
 
 @pytest.fixture(scope="module")
