@@ -96,7 +96,8 @@ def _of_room(light: Array, direction: Vector, channel: int) -> float:
     value: float = light[0, channel]
     value += x * light[1, channel] + y * light[2, channel] + z * light[3, channel]
     value += x * y * light[4, channel] + y * z * light[5, channel] + z * x * light[6, channel]
-    return value + (x * x - y * y) * light[7, channel] + (3.0 * z * z - 1.0) * light[8, channel]
+    value += (x * x - y * y) * light[7, channel] + (3.0 * z * z - 1.0) * light[8, channel]
+    return value
 
 
 @inlined
@@ -248,7 +249,8 @@ def lit(finishes: Sequence[Finish], texels: int) -> tuple[Materials, Lights]:
 
 def _blurred(second: float, third: float) -> Array:
     """The room's light with two of its lines blurred, shape (9, 3)."""
-    return ROOM * np.repeat([1.0, second, third], (1, 3, 5))[:, None]
+    blurred: Array = ROOM * np.repeat([1.0, second, third], (1, 3, 5))[:, None]
+    return blurred
 
 
 def _mirrored(roughness: float) -> Array:
