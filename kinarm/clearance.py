@@ -16,6 +16,7 @@ from kinarm.arm_specification import arm_names
 from kinarm.collision import ContactModel
 from kinarm.contact_pairs import TOUCH_AT_HOME, make_verdicts_reliable
 from kinarm.errors import ProblemError
+from kinarm.goal_kinematics import SAMPLE
 from kinarm.kernels.compiling import Array
 from kinarm.scene import Scene
 
@@ -136,49 +137,23 @@ def random_configurations(model: ContactModel, count: int, seed: int = 0) -> Arr
     return q
 
 
-GOALS, MANY = 100, 0.1
-"""Goals to look at, and the share that may be missed without a warning."""
-
-
-def find_reachable(world: "World", goals: Array, configurations: int = 50_000) -> NDArray[np.bool_]:
-    """Find out which goals have a configuration without contact.
-
-    Random configurations are tried first, then inverse kinematics. An arm that
-    always touches something is refused.
-
-    Parameters
-    ----------
-    world, configurations
-        Arm and scene, and number of random configurations.
-    goals : ndarray, shape (n, 3)
-        Goal points [m].
-
-    Returns
-    -------
-    ndarray of bool, shape (n,)
-    """
-    q = random_configurations(world.contact_model, configurations)
-    tools, touching = world.screen(q)
-    if touching.all():
-        ContactStatistics.sample(world.contact_model).check_movable(world.arm.name)
-    tools, tolerance = tools[~touching], world.problem.task.tolerance
-    found = np.array([(np.linalg.norm(tools - goal, axis=1) <= tolerance).any() for goal in goals])
-    missing = np.flatnonzero(~found)
-    solutions = world.inverse_kinematics(goals[missing], free=True, most=256)
-    found[missing[solutions.owner]] = True
-    return found
+MANY = 0.1
+"""Share of goals that may be missed without a warning."""
 
 
 def reach_warning(world: "World") -> str | None:
-    """Say in a line if many of a problem's goals seem out of reach."""
-    goals = world.goals.draw(np.random.default_rng(0), GOALS)
-    found = find_reachable(world, goals[:, :3])
-    missed = int((~found).sum())
-    if missed <= MANY * GOALS:
+    """Say in a line if many of a problem's goals seem out of reach.
+
+    Raises ProblemError if the arm always touches something.
+    """
+    missed = SAMPLE - world.reachable_of_sample
+    if missed <= MANY * SAMPLE:
         return None
+    if missed == SAMPLE:
+        ContactStatistics.sample(world.contact_model).check_movable(world.arm.name)
     return (
         f"problem {world.problem.name}: no contact-free configuration was found for {missed} of "
-        f"{GOALS} goals; see kinarm-problem check"
+        f"{SAMPLE} goals; see kinarm-problem check"
     )
 
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from kinarm.clearance import find_reachable, reach_warning
+from kinarm.clearance import reach_warning
 from kinarm.errors import ProblemError
 from kinarm.policies.oracle import Oracle
 from kinarm.problem import PROBLEMS
@@ -11,14 +11,15 @@ from kinarm.scene import GoalRegion, Obstacle, Scene
 from kinarm.world import World
 
 
-def goals_of(world, count, seed=1):
-    return world.goals.draw(np.random.default_rng(seed), count)
+def find_reachable(world, goals):
+    nothing = np.zeros((0, *world.contact_model.shapes.placed.shape))
+    return world.solved_goals(goals, np.zeros(len(goals)), nothing)[0]
 
 
 @pytest.mark.parametrize("arm", ["paper", "paper_flange"])
 def test_finds_what_the_oracle_reaches(arm):
     """All but a few at the edge of what an arm can reach."""
-    problem = PROBLEMS["both"].replace(arm=arm)
+    problem = PROBLEMS["both"].replace(arm=arm, tolerance=0.005)
     world, oracle = World(problem), Oracle(problem)
     starts, goals = oracle.simulator.sample(np.random.default_rng(1), 40)
     reached = oracle.solve_batch(starts, goals).reachable
@@ -32,18 +33,10 @@ def test_goals_deep_in_an_obstacle_are_not_found():
     inside = GoalRegion(name="inside", lower=(0.4, -0.05, 0.35), upper=(0.8, 0.05, 0.45))
     scene = Scene(obstacles=(block,), goal_regions=(inside,))
     world = World(PROBLEMS["right"].replace(scene=scene, goal_regions=("inside",)))
-    goals = goals_of(world, 30)
+    goals = world.goals.draw(np.random.default_rng(1), 30)
     found = find_reachable(world, goals)
     deep = goals[:, 0] < 0.55
     assert not found[deep].any()
-
-
-def test_is_the_same_every_time():
-    world = World(PROBLEMS["both"].replace(arm="paper_flange"))
-    goals = goals_of(world, 25)
-    first = find_reachable(world, goals, 5000)
-    np.testing.assert_array_equal(first, find_reachable(world, goals, 5000))
-    np.testing.assert_array_equal(first[5:9], find_reachable(world, goals[5:9], 5000))
 
 
 def test_a_line_if_more_than_a_tenth_is_missed():
