@@ -1,9 +1,8 @@
 """What goals mean for an arm: where they lie, and which configurations reach them."""
 
 import math
-from copy import copy
 from functools import cached_property
-from typing import Any, Self
+from typing import Any
 
 import numpy as np
 import pinocchio as pin
@@ -77,19 +76,6 @@ class GoalKinematics(InverseKinematics):
             moves=goal.motion.offsets(times) if goal.motion else np.zeros((0, 3)),
         )
         return recorded(rules)
-
-    def with_tolerance(self, tolerance: float, rotation_tolerance: float | None = None) -> Self:
-        """The same world with another tolerance [m], and perhaps of rotations; it shares all else.
-
-        See `kinarm.GoalSpecification` for that of rotations.
-        """
-        other, goal = copy(self), None
-        if rotation_tolerance is not None:
-            goal = {"rotation_tolerance": rotation_tolerance}
-        other.problem = self.problem.replace(tolerance=tolerance, goal=goal)
-        goal_rules = other._goal_rules() if goal else self.rules.goal
-        other.rules = self.rules._replace(tolerance=float(tolerance), goal=goal_rules)
-        return other
 
     @cached_property
     def goal_width(self) -> int:

@@ -83,43 +83,38 @@ class Simulator(EpisodeRunner):
         """Largest move of each actuated joint, shape (n_actions,) [rad or m]."""
         return self.world.rules.step_limit.copy()
 
+    def _in(self, world: World) -> "Simulator":
+        """The same simulator in another world."""
+        other = copy(self)
+        other.world = world
+        return other
+
     def with_tolerance(
         self, tolerance: float, rotation_tolerance: float | None = None
     ) -> "Simulator":
         """Another simulator of the same world with other tolerances [m, and rad or m]."""
-        other = copy(self)
-        other.world = self.world.with_tolerance(tolerance, rotation_tolerance)
-        return other
+        goal = rotation_tolerance and {"rotation_tolerance": rotation_tolerance}
+        return self._in(self.world.changed(tolerance=tolerance, goal=goal))
 
     def in_scene(self, start: ArrayLike, goal: ArrayLike) -> "Simulator":
         """The simulator of one episode; see `kinarm.World.in_scene`."""
-        other = copy(self)
-        other.world = self.world.in_scene(start, goal)
-        return other
+        return self._in(self.world.in_scene(start, goal))
 
     def with_plant(self, plant: PlantLike) -> "Simulator":
         """Another simulator of the same world with another plant, itself, its name or file."""
-        other = copy(self)
-        other.world = self.world.with_plant(plant)
-        return other
+        return self._in(self.world.changed(plant=plant))
 
     def shielded(self, shield: bool = True) -> "Simulator":
         """The same simulator with or without a shield."""
-        other = copy(self)
-        other.world = self.world.shielded(shield)
-        return other
+        return self._in(self.world.changed(shield=shield))
 
     def seen_as(self, observation: Observation) -> "Simulator":
         """The same simulator with another observation; ProblemError if it cannot have it."""
-        other = copy(self)
-        other.world = self.world.seen_as(observation)
-        return other
+        return self._in(self.world.changed(observation=observation))
 
     def without_moving_bodies(self) -> "Simulator":
         """The same simulator without the bodies that move."""
-        other = copy(self)
-        other.world = self.world.without_moving_bodies()
-        return other
+        return self._in(self.world.without_moving_bodies())
 
     def sample(
         self, rng: np.random.Generator, count: int, *, start_spread: float | None = None

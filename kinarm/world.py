@@ -70,6 +70,12 @@ class World(GoalKinematics, StepContact, WorldChanges):
         self.arm = self.problem.load_arm()
         self.contact_model = ContactModel.build(self.arm, self.problem.scene)
         self.starts = self.checked("task.starts", self.problem.task.starts)
+        self._derive()
+        self.has_random_bodies = bool(self.problem.scene.random_bodies)
+        self._idle: list[tuple[Block, Alone]] = []
+
+    def _derive(self) -> None:
+        """Find what kernels have to know of the problem."""
         task, stepping = self.problem.task, self.problem.stepping
         self.rules = Rules(
             step_limit=self.arm.velocity_limits[: self.arm.n_actuated] * stepping.time_step,
@@ -86,8 +92,6 @@ class World(GoalKinematics, StepContact, WorldChanges):
             shield=shield_table(self.arm.n_actuated if stepping.shield else 0),
         )
         self.plants = EpisodePlants(self.problem, self.rules.step_limit)
-        self.has_random_bodies = bool(self.problem.scene.random_bodies)
-        self._idle: list[tuple[Block, Alone]] = []
 
     def __repr__(self) -> str:
         return f"World({self.problem!r})"

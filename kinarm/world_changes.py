@@ -1,9 +1,9 @@
-"""The scenes of episodes, and worlds that differ in one of them, a tolerance, shield or plant."""
+"""The scenes of episodes, and worlds that differ in one of them, or in settings."""
 
 from copy import copy
 from dataclasses import replace
 from functools import cached_property
-from typing import Self
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -16,12 +16,8 @@ from kinarm.episode_scenes import drawn_rows
 from kinarm.episodes import Rules
 from kinarm.errors import finite_array
 from kinarm.kernels.compiling import Array
-from kinarm.observation_choice import Observation
-from kinarm.observation_layout import ObservationLayout
-from kinarm.plant import PlantLike
 from kinarm.problem import ReachProblem
 from kinarm.scene_draws import SceneDraws
-from kinarm.shield import shield_table
 
 
 class WorldChanges:
@@ -54,29 +50,19 @@ class WorldChanges:
         drawn = self.problem.scene, self._draws, self.arm.chain
         return drawn_rows(*drawn, starts, np.ascontiguousarray(goals[:, :3]), self.threads)
 
-    def shielded(self, shield: bool = True) -> Self:
-        """The same world with or without a shield."""
+    def changed(self, **changes: Any) -> Self:
+        """The same world of a problem with other settings of task, plant, observation or stepping.
+
+        Takes what `kinarm.ReachProblem.replace` does, but for arm and scene. Raises ProblemError if
+        arm or scene cannot have the observation.
+        """
         other = copy(self)
-        other.problem = self.problem.replace(shield=shield)
-        other.rules = self.rules._replace(shield=shield_table(self.arm.n_actuated if shield else 0))
+        other.problem = self.problem.replace(**changes)
+        other._derive()
         return other
 
-    def with_plant(self, plant: PlantLike) -> Self:
-        """The same world with another plant, itself, its name or file."""
-        other = copy(self)
-        other.problem = self.problem.replace(plant=plant)
-        commanded = int(other.problem.plant.feedback == "commanded")
-        other.rules = self.rules._replace(commanded=commanded)
-        other.plants = EpisodePlants(other.problem, other.rules.step_limit)
-        return other
-
-    def seen_as(self, observation: Observation) -> Self:
-        """The same world with another observation; ProblemError if it cannot have it."""
-        other = copy(self)
-        other.problem = self.problem.replace(observation=observation)
-        layout = ObservationLayout.of(other.problem, self.arm)
-        other.rules = self.rules._replace(**layout.rules(other.problem))
-        return other
+    def _derive(self) -> None:
+        raise NotImplementedError
 
     def in_scene(self, start: ArrayLike, goal: ArrayLike) -> Self:
         """The world of one episode, whose random bodies stay where they are.

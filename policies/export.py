@@ -128,7 +128,7 @@ def contract_of(
     Sign and offset are those of `export_policy`. InvalidInputError if the policy sees what
     only kinarm computes.
     """
-    world = world.seen_as(policy.observation)
+    world = world.changed(observation=policy.observation)
     problem, arm, layout, made = world.problem, world.arm, world.layout, policy.provenance
     if layout.sees_bodies:
         seen = [name for name in ("proximity", "obstacles") if name in layout.places]
