@@ -44,6 +44,9 @@ SHADOW_REACH = 1.75
 SHADOW_BIAS = 0.002
 """How much nearer the sun a shadow's cause must be [m]."""
 
+SUN_DEPTH = 25.0
+"""How far from the origin, towards the sun and away, shadows are cast [m]."""
+
 LOG_2 = math.log(2.0)
 
 
@@ -69,7 +72,8 @@ class Lights(NamedTuple):
     sky, ground (3,): light from the left (y) and from the right, which fade into each other.
     irradiance (9, 3): the same on surfaces that face a direction.
     sunward (3, 4): world to shadow map.
-    shadow (n, n): how near the sun the last surface is that keeps it off.
+    shadow (n, n, 1): how near the sun the last surface is that keeps it off, plus `SUN_DEPTH`; the
+    backs of surfaces, since fronts would shadow themselves.
     """
 
     directions: Array
@@ -117,7 +121,7 @@ def sunlit(lights: Lights, place: Vector) -> float:
     for row in range(4):
         high = 1.0 - bottom_share if row == 0 else bottom_share if row == 3 else 1.0
         for column in range(4):
-            if shadow[top + row, left + column] <= near:
+            if shadow[top + row, left + column, 0] <= near:
                 wide = 1.0 - right_share if column == 0 else right_share if column == 3 else 1.0
                 light += high * wide
     return light / 9.0
@@ -234,8 +238,8 @@ def lit(finishes: Sequence[Finish], texels: int) -> tuple[Materials, Lights]:
         sky=SKY_INTENSITY * channels(SKY),
         ground=SKY_INTENSITY * channels(GROUND),
         irradiance=_blurred(*DULL),
-        sunward=np.column_stack([turn, (texels / 2, texels / 2, 0.0)]),
-        shadow=np.empty((texels, texels), dtype=np.float32),
+        sunward=np.column_stack([turn, (texels / 2, texels / 2, SUN_DEPTH)]),
+        shadow=np.empty((texels, texels, 1), dtype=np.float32),
     )
     materials = Materials(
         colour=to_linear([channels(finish.colour) for finish in finishes]),

@@ -14,9 +14,9 @@ from kinarm.kernels.compiling import Array
 from kinarm.problem import ProblemLike, ReachProblem
 from kinarm.recording import OUTCOMES
 from kinarm.viewer.camera import Camera, CameraLike, stage_scale
-from kinarm.viewer.kernels.rasterising import Eye, Surfaces, draw_shadow, draw_view, transform
+from kinarm.viewer.kernels.rasterising import Eye, Surfaces, draw_view, transform
 from kinarm.viewer.kernels.shading import BACKGROUND, View, paint_floor, shade
-from kinarm.viewer.lighting import lit
+from kinarm.viewer.lighting import SUN_DEPTH, lit
 from kinarm.viewer.meshes import Mesh, tube
 from kinarm.viewer.parts import (
     FLASH_RADIUS,
@@ -35,6 +35,8 @@ from kinarm.viewer.visual_shapes import arm_parts, link_joints
 
 SAMPLES = np.array([(0.375, 0.125), (0.875, 0.375), (0.125, 0.625), (0.625, 0.875)])
 """Places in a pixel, no two in a row or column, for edges of any slope."""
+
+MIDDLE = np.array([(0.5, 0.5)])
 
 GRID_WIDTH = 1 / 600
 """Width of the floor's lines, as a share of the picture's height."""
@@ -149,10 +151,12 @@ class Renderer:
         nearness = self._floor_nearness.copy()
         seen = np.full(nearness.shape, -1, dtype=np.int32)
         draw_view(surfaces.corners, surfaces.faces, SAMPLES, nearness, seen)
-        shadowed = np.empty_like(surfaces.places)
+        shadow, shadowed = self._lights.shadow, np.empty_like(surfaces.places)
         transform(surfaces.places, everywhere, self._lights.sunward[None], shadowed)
-        self._lights.shadow.fill(-np.inf)
-        draw_shadow(shadowed, surfaces.faces, self._lights.shadow)
+        away = 1.0 / shadowed[:, 2:].clip(1.0, 2 * SUN_DEPTH)  # as of a picture's surfaces
+        corners = np.concatenate([shadowed[:, :2] * away, away], axis=1)
+        shadow.fill(0.0)
+        draw_view(corners, surfaces.faces, MIDDLE, shadow, np.empty(shadow.shape, np.int32))
         emission = self._scene.emission(outcome, contact.pair if contact else ())
         view = View(
             eye=self._eye,

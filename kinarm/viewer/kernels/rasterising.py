@@ -85,7 +85,7 @@ def draw_view(
     nearness: NDArray[np.float32],
     index: NDArray[np.int32],
 ) -> None:
-    """Find the nearest front of a triangle at every sample.
+    """Find the nearest triangle at every sample, of those anticlockwise there.
 
     Barycentric coordinates over the distance are linear in the picture (Olano
     and Greer, 1997), so triangles behind the camera need no clipping.
@@ -136,46 +136,3 @@ def draw_view(
                         if near > nearness[row, column, sample]:
                             nearness[row, column, sample] = near
                             index[row, column, sample] = face
-
-
-@kernel
-def draw_shadow(shadowed: Array, faces: NDArray[np.int64], depth: NDArray[np.float32]) -> None:
-    """Keep how near the sun the nearest back of a triangle is in every texel's middle.
-
-    Backs, unlike fronts, do not let lit surfaces shadow themselves.
-
-    Parameters
-    ----------
-    shadowed : ndarray, shape (n_vertices, 3)
-        Vertices for the sun: column and row of the shadow map, and how near the
-        sun [m].
-    faces, depth
-        ``faces`` of `Surfaces` and ``shadow`` of `Lights`, which is changed in
-        place.
-    """
-    height, width = depth.shape
-    for face in range(faces.shape[0]):
-        i, j, k = faces[face, 0], faces[face, 1], faces[face, 2]
-        xi, yi, xj, yj = shadowed[i, 0], shadowed[i, 1], shadowed[j, 0], shadowed[j, 1]
-        xk, yk = shadowed[k, 0], shadowed[k, 1]
-        area = (xj - xi) * (yk - yi) - (xk - xi) * (yj - yi)
-        if area >= 0.0:
-            continue
-        left = max(0, math.floor(max(min(xi, xj, xk), -1.0)))
-        right = min(width - 1, math.floor(min(max(xi, xj, xk), width + 0.0)))
-        top = max(0, math.floor(max(min(yi, yj, yk), -1.0)))
-        bottom = min(height - 1, math.floor(min(max(yi, yj, yk), height + 0.0)))
-        scale = 1.0 / area
-        for row in range(top, bottom + 1):
-            for column in range(left, right + 1):
-                x, y = column + 0.5, row + 0.5
-                share_j = ((x - xi) * (yk - yi) - (xk - xi) * (y - yi)) * scale
-                share_k = ((xj - xi) * (y - yi) - (x - xi) * (yj - yi)) * scale
-                share_i = 1.0 - share_j - share_k
-                if share_i >= 0.0 and share_j >= 0.0 and share_k >= 0.0:
-                    near = (
-                        share_i * shadowed[i, 2]
-                        + share_j * shadowed[j, 2]
-                        + share_k * shadowed[k, 2]
-                    )
-                    depth[row, column] = max(depth[row, column], near)
