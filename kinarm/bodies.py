@@ -154,22 +154,6 @@ class Body(Checked):
             return rotation_of_quaternion(self.quaternion)
         return rotation_matrix(self.rpy)
 
-    @property
-    def bounds(self) -> NDArray[np.float64]:
-        """Lower and upper corner of a box about it, in its own frame, shape (2, 3) [m]."""
-        if self.shape == "mesh":
-            points = np.array(self.vertices)
-            return np.array([points.min(axis=0), points.max(axis=0)])
-        if self.shape == "halfspace":
-            return np.array([[-np.inf] * 3, [np.inf, np.inf, 0.0]])
-        if self.shape == "box":
-            half = np.array(self.size) / 2
-        else:
-            radius, length = (*self.size, 0.0)[:2]
-            beyond = radius if self.shape != "cylinder" else 0.0
-            half = np.array([radius, radius, length / 2 + beyond])
-        return np.array([-half, half])
-
     def contains(self, points: NDArray[np.float64], margin: float) -> NDArray[np.bool_]:
         """Whether points, shape (n, 3), lie in it, if it were larger by a margin [m]."""
         x, y, z = ((points - np.array(self.position)) @ self.rotation).T

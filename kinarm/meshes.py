@@ -228,6 +228,13 @@ def coal_shape(body: "Body") -> coal.CollisionGeometry:
     return kinds.get(body.shape, coal.Cylinder)(*body.size)
 
 
+def box_about(body: "Body") -> NDArray[np.float64]:
+    """Lower and upper corner of a box about a body, in its own frame, shape (2, 3) [m]."""
+    shape = coal_shape(body)
+    shape.computeLocalAABB()
+    return np.array([shape.aabb_local.min_, shape.aabb_local.max_])
+
+
 def enclosing_corners(points: NDArray[np.float64]) -> NDArray[np.float64]:
     """Corners, at most ``2 * PLANES - 4``, of a polytope around points with a volume [m].
 

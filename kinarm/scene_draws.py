@@ -9,6 +9,7 @@ from kinarm.bodies import RandomBodies
 from kinarm.contact_shapes import placed_row, unit_body
 from kinarm.errors import UnknownNameError
 from kinarm.kernels.compiling import Array
+from kinarm.meshes import box_about
 from kinarm.scene import Scene
 
 IN_WORLD, ON_PATH, ON_BODY = range(3)
@@ -79,7 +80,7 @@ class SceneDraws(NamedTuple):
             sizes.append([(*unit.size, unit.rounding) for unit in units])
             corners = units[0].corners
             extents.append((corners.min(axis=0), corners.max(axis=0)))
-            places.append(_places(each, near, scene.bodies[surface].bounds))
+            places.append(_places(each, near, box_about(scene.bodies[surface])))
         return cls(
             entries=np.array(entries, dtype=np.int64).reshape(-1, 6),
             measures=np.array(

@@ -115,7 +115,8 @@ def test_mesh_files_are_named_from_the_arm_file(tmp_path):
         ReachProblem.load(tmp_path / "problem.toml").arm.held_bodies,
     ]
     for (body,) in bodies:
-        np.testing.assert_allclose(body.bounds, [[-0.025] * 3, [0.025] * 3], atol=1e-9)
+        ends = np.sort(body.vertices, axis=0)[[0, -1]]
+        np.testing.assert_allclose(ends, [[-0.025] * 3, [0.025] * 3], atol=1e-9)
 
 
 @pytest.mark.parametrize(

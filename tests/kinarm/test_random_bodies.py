@@ -11,6 +11,7 @@ from kinarm.bodies import RandomBodies
 from kinarm.episode_scenes import scene_of_episode
 from kinarm.errors import KinarmError
 from kinarm.kernels.placing import uniform
+from kinarm.meshes import box_about
 from kinarm.policies import Oracle
 from kinarm.problem import PROBLEMS, ReachProblem
 from kinarm.recording import record_rollouts
@@ -115,9 +116,9 @@ class TestDraws:
         for start, goal in zip(*(each[:50] for each in scenarios), strict=True):
             scene = scene_of_episode(changing.scene, changing.arm, start, goal)
             for body in scene.obstacles[2:]:
-                height = body.position[2] + (body.rotation @ body.bounds.T).min(axis=1)[2]
+                height = body.position[2] + (body.rotation @ box_about(body).T).min(axis=1)[2]
                 if body.name.startswith(("block", "can")):
-                    bottom = body.position[2] + body.bounds[0, 2]
+                    bottom = body.position[2] + box_about(body)[0, 2]
                     assert bottom == pytest.approx(0.3, abs=1e-12)
                     side = -1 if body.name.startswith("block") else 1
                     assert 0.55 <= side * body.position[1] <= 0.75
