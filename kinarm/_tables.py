@@ -130,21 +130,13 @@ class TableOptions(Checked):
 
 
 def csv_text(rows: Sequence[Mapping[str, Any]]) -> str:
-    """Rows as CSV, with a heading; a value that one has not is empty.
-
-    Texts that a spreadsheet would take for a formula get an apostrophe in front.
-    """
+    """Rows as CSV, with a heading; a value that one has not is empty."""
     names = dict.fromkeys(name for row in rows for name in row)
     text = io.StringIO()
     writer = csv.DictWriter(text, [*names], lineterminator="\n")
     writer.writeheader()
-    writer.writerows({name: _harmless(value) for name, value in row.items()} for row in rows)
+    writer.writerows(rows)
     return text.getvalue()
-
-
-def _harmless(value: Any) -> Any:
-    formula = isinstance(value, str) and value.startswith(("=", "+", "-", "@"))
-    return f"'{value}" if formula else value
 
 
 class _Filled(NamedTuple):
