@@ -16,7 +16,6 @@ from kinarm.arm_specification import arm_names
 from kinarm.collision import ContactModel
 from kinarm.contact_pairs import TOUCH_AT_HOME, make_verdicts_reliable
 from kinarm.errors import ProblemError
-from kinarm.goal_kinematics import SAMPLE
 from kinarm.kernels.compiling import Array
 from kinarm.scene import Scene
 
@@ -146,6 +145,8 @@ def reach_warning(world: "World") -> str | None:
 
     Raises ProblemError if the arm always touches something.
     """
+    from kinarm.goal_kinematics import SAMPLE  # which much else does without
+
     missed = SAMPLE - world.reachable_of_sample
     if missed <= MANY * SAMPLE:
         return None
