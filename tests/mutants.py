@@ -43,7 +43,7 @@ AREAS = {
         ("kinarm/kernels/*.py",),
         (
             *("kinarm/kernels/test_*.py", *ROLLOUTS, "kinarm/test_col*.py", "kinarm/test_inv*.py"),
-            *("kinarm/test_clear*.py", "kinarm/test_motion*.py", "kinarm/test_encl*.py"),
+            *("kinarm/test_step_*.py", "kinarm/test_motion*.py", "kinarm/test_encl*.py"),
             *("kinarm/test_frames.py", "kinarm/test_obs*.py", "kinarm/test_scenarios.py"),
         ),
         20,
