@@ -11,6 +11,14 @@ from kinarm.goals import GOAL_RESTS, REST_ERRORS, REST_PARTS
 PAPER_PARTS = ("goal", "goal_minus_tool", "orientation", "position")
 """The paper's observation (section 3.2)."""
 
+PARTS = (
+    *(*PAPER_PARTS, "resolved_rate", "joint_positions", "joint_angles", "joint_velocities"),
+    *("last_action", "commanded", "time_left", "proximity", "obstacles"),
+    *GOAL_RESTS,
+    *REST_ERRORS,
+)
+"""Names of all parts."""
+
 LONGEST_HISTORY, MOST_SLOTS = 32, 32
 
 
@@ -39,14 +47,11 @@ class Observation(Checked):
         super().__post_init__()
         if self.parts is None:
             return
-        from kinarm.observation import OBSERVATION  # loads Numba
-
-        available = [part.name for part in OBSERVATION]
         if not self.parts:
-            raise ProblemError(f"an observation needs parts; available: {', '.join(available)}")
+            raise ProblemError(f"an observation needs parts; available: {', '.join(PARTS)}")
         for name in self.parts:
-            if name not in available:
-                raise UnknownNameError("part of the observation", name, available)
+            if name not in PARTS:
+                raise UnknownNameError("part of the observation", name, PARTS)
             if self.parts.count(name) > 1:
                 raise ProblemError(f"the observation has the part {name!r} twice")
 
