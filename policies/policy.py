@@ -245,10 +245,8 @@ class Policy:
             The problem that it is for.
         mean, std : array_like, shape (n_observations,), optional
             Statistics that normalise its inputs, if any.
-        name : str
-            Name of its algorithm, for tables.
-        environment_steps, seed
-            Steps and seed of its training.
+        name, environment_steps, seed
+            Name of its algorithm, and steps and seed of its training, for tables.
         """
         from kinarm.policies.conversion.layers import module_pieces, policy_of_pieces
 
