@@ -55,7 +55,7 @@ aarch64: $(call INSTALLED,dev) ## compute the same on an emulated AArch64, and s
 
 clean: ## remove what the other targets made
 	rm -rf $(VENV) build dist *.egg-info .coverage .mypy_cache .pytest_cache .ruff_cache .hypothesis
-	rm -rf docs/_build docs/gallery docs/sg_execution_times.rst
+	rm -rf docs/_build
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +
 
 $(BIN)/python:

@@ -2,8 +2,7 @@
 
 ``<!-- run -->`` on the line before a block of code has it run, and ``<!-- {toctree}`` up to
 ``-->`` is a directive of Sphinx. Blocks that name a file in their first line are what the reader
-saves under that name. Names such as ``kinarm.ReachTask`` become links, and scripts of the gallery
-links to their pages. Every line keeps its number.
+saves under that name. Names such as ``kinarm.ReachTask`` become links. Every line keeps its number.
 """
 
 import re
@@ -24,7 +23,6 @@ FILE = re.compile(r"(?:#|<!--) ([\w./-]+\.\w+)(?: -->)?\n")
 
 DIRECTIVE = re.compile(r"^<!-- (\{[\w-]+\}.*)\n((?:.*\n)*?)-->$", re.M)
 NAME = re.compile(r"(?<![`\[])(`kinarm(?:\.\w+)+`)(?!`)")
-EXAMPLE = re.compile(r"(\]\((?:\.\./)*)examples(?:/(\w+)\.py)?\)")
 
 
 def for_site(page: str) -> str:
@@ -50,8 +48,7 @@ def _block(block: re.Match[str]) -> str:
 
 def _text(text: str) -> str:
     """What stands between blocks."""
-    text = NAME.sub(r"{py:obj}\1", DIRECTIVE.sub(r"```\1\n\2```", text))
-    return EXAMPLE.sub(lambda link: f"{link[1]}gallery/{link[2] or 'index'})", text)
+    return NAME.sub(r"{py:obj}\1", DIRECTIVE.sub(r"```\1\n\2```", text))
 
 
 def _read(_app: "Sphinx", _page: str, source: list[str]) -> None:

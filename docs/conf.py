@@ -11,7 +11,7 @@ from sphinx import addnodes
 from sphinx.application import Sphinx
 from sphinx_autodoc_typehints import process_signature
 
-mpl.use("Agg")  # examples run without a display
+mpl.use("Agg")  # pages run without a display
 sys.path.insert(0, str(Path(__file__).parent))  # extensions
 
 import kinarm
@@ -29,14 +29,13 @@ extensions = [
     "sphinx.ext.autodoc",
     "sphinx.ext.napoleon",
     "sphinx_autodoc_typehints",
-    "sphinx_gallery.gen_gallery",
     "api_index",
     "commands",
     "comments",
+    "notebooks",
     "runs",
 ]
-# examples: read by sphinx-gallery, which writes its pages to gallery.
-exclude_patterns = ["_build", "examples"]
+exclude_patterns = ["_build"]
 nitpicky = True
 # Docstrings put names of ours between single backticks.
 default_role = "py:obj"
@@ -70,24 +69,6 @@ nitpick_ignore_regex = [
     (r"py:class", r"kinarm\.(kernels\.session\.Session|episodes\.Rules|goals\.Goals)"),
     (r"py:class", r"kinarm\.collision\.Step"),
 ]
-
-sphinx_gallery_conf = {
-    "examples_dirs": "examples",
-    "gallery_dirs": "gallery",
-    "abort_on_example_error": True,
-    "image_scrapers": ("matplotlib",),
-    "matplotlib_animations": False,
-    "capture_repr": ("_repr_html_",),
-    "remove_config_comments": True,
-    "show_memory": False,
-    "show_signature": False,
-    "min_reported_time": 1e9,
-    "write_computation_times": False,
-    "download_all_examples": False,
-    "doc_module": ("kinarm",),
-    "reference_url": {"kinarm": None},
-    "backreferences_dir": None,
-}
 
 html_theme = "furo"
 html_title = f"kinarm {release}"

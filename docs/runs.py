@@ -4,6 +4,7 @@ The blocks of a page run one after the other, in a folder that is empty before t
 Python shares one namespace, and a block that fails fails the build.
 """
 
+import ast
 import base64
 import contextlib
 import io
@@ -17,6 +18,7 @@ from tempfile import TemporaryDirectory, TemporaryFile
 from typing import Any
 from unittest import mock
 
+import matplotlib.pyplot as plt
 from comments import FILE
 from docutils import nodes
 from sphinx.application import Sphinx
@@ -49,16 +51,39 @@ class Page:
         self._folder = TemporaryDirectory()
         self._names: dict[str, Any] = {"__name__": "__main__"}
 
-    def run_python(self, code: str, line: int = 1) -> str:
+    def run_python(self, code: str | ast.Module, line: int = 1) -> str:
         """Run code that begins at a line of the page, without a browser; what it printed."""
         printed = io.StringIO()
+        tree = ast.parse(code) if isinstance(code, str) else code
         with (
             contextlib.chdir(self._folder.name),
             contextlib.redirect_stdout(printed),
             mock.patch.dict(os.environ, {"BROWSER": "true"}),
         ):
-            exec(compile("\n" * (line - 1) + code, self._source, "exec"), self._names)
+            exec(compile(ast.increment_lineno(tree, line - 1), self._source, "exec"), self._names)
         return printed.getvalue()
+
+    def run_cell(self, code: str, line: int = 1) -> tuple[str, str]:
+        """Run a cell of a notebook: what it printed, and its last value and figures as HTML."""
+        tree, made = ast.parse(code), []
+
+        def display(value: object) -> None:
+            if hasattr(value, "_repr_html_"):
+                made.append(value._repr_html_())
+            elif value is not None:
+                print(repr(value))
+
+        self._names["display"] = display
+        last = tree.body[-1]
+        if isinstance(last, ast.Expr) and not code.rstrip().endswith(";"):
+            last.value = ast.Call(ast.Name("display", ast.Load()), [last.value], [])
+        printed = self.run_python(ast.fix_missing_locations(tree), line)
+        for number in plt.get_fignums():
+            drawn = io.BytesIO()
+            plt.figure(number).savefig(drawn, dpi=120)
+            made.append(shown("figure.png", drawn.getvalue()))
+        plt.close("all")
+        return printed, "".join(made)
 
     def run_commands(self, commands: str, line: int = 1, *, fails: bool = False) -> str:
         """Run command lines, with the commands of this Python first; what they printed.
@@ -123,7 +148,8 @@ class KinarmRun(SphinxDirective):
     """Show Python or command lines (``sh``), run them, and show what they printed and made.
 
     A word ``fails`` behind the language says that command lines end with a message, which is
-    shown, and ``shows=FILE`` which file is shown. A block that names a file is written to it.
+    shown, ``shows=FILE`` which file is shown, and ``cell`` that Python is a cell of a notebook. A
+    block that names a file is written to it.
     """
 
     has_content = True
@@ -139,7 +165,10 @@ class KinarmRun(SphinxDirective):
             page.write(file[1], code)
             return found
         line = self.lineno + self.content_offset + 1
-        if language == "python":
+        drawn = ""
+        if "cell" in options:
+            printed, drawn = page.run_cell(code, line)
+        elif language == "python":
             printed = page.run_python(code, line)
         else:
             printed = page.run_commands(code, line, fails="fails" in options)
@@ -147,7 +176,9 @@ class KinarmRun(SphinxDirective):
             kinds = ["printed"] if COLUMNS.search(printed) else ["printed", "wraps"]
             found.append(nodes.literal_block(printed, printed, language="text", classes=kinds))
         if made := options.get("shows"):
-            found.append(nodes.raw("", shown(made, page.read(made)), format="html"))
+            drawn = shown(made, page.read(made))
+        if drawn:
+            found.append(nodes.raw("", drawn, format="html"))
         return found
 
     def _page(self) -> Page:

@@ -11,8 +11,7 @@ from docs.comments import for_site
 DOCS = Path(__file__).resolve().parents[2] / "docs"
 
 PAGE = """\
-`kinarm.Scene` [`kinarm.World`](a.md) `kinarm-eval` [b](../examples/plot_b.py)
-[c](examples)
+`kinarm.Scene` [`kinarm.World`](a.md) `kinarm-eval`
 <!-- run shows=a.png -->
 ```python
 `kinarm.Scene`
@@ -27,8 +26,7 @@ PAGE = """\
 <!-- table arm -->
 """
 BUILT = """\
-{py:obj}`kinarm.Scene` [`kinarm.World`](a.md) `kinarm-eval` [b](../gallery/plot_b)
-[c](gallery/index)
+{py:obj}`kinarm.Scene` [`kinarm.World`](a.md) `kinarm-eval`
 
 ```{kinarm-run} python shows=a.png
 `kinarm.Scene`
@@ -75,6 +73,16 @@ def test_blocks_share_names_and_a_folder_and_their_prints_are_kept(page):
     assert page.run_python("made.write_text('made')\nprint(made)") == "made.txt\n"
     assert page.run_commands("cat made.txt") == "made"
     assert page.read("made.txt") == b"made"
+
+
+def test_a_cell_shows_its_last_value_and_its_figures(page):
+    assert page.run_cell("x = 2\nprint(1)\nx") == ("1\n2\n", "")
+    assert page.run_cell("x;") == page.run_cell("None") == page.run_cell("x = 3") == ("", "")
+    drawn = "import matplotlib.pyplot as plt\nplt.plot([1, x]);"
+    printed, made = page.run_cell(drawn)
+    assert printed == ""
+    assert made.startswith('<img src="data:image/png;base64,')
+    assert page.run_cell("x") == ("3\n", "")  # the figure is not shown again
 
 
 def test_a_block_that_fails_says_where(page, runs):

@@ -9,7 +9,7 @@ from docs.comments import BLOCK, FILE
 
 ROOT = Path(__file__).resolve().parents[2]
 DOCS = ROOT / "docs"
-MADE = ("_build", "gallery")
+MADE = ("_build",)
 
 LINK = re.compile(r"\]\(<?([^)\s>]+)")
 HEADING = re.compile(r"^#+ +(.+?) *$", re.M)
