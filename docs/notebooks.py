@@ -22,8 +22,8 @@ import subprocess
 import sys
 
 if importlib.util.find_spec("kinarm") is None:
-    source = "kinarm @ git+{repository}"
-    subprocess.run([sys.executable, "-m", "pip", "install", "-q", source], check=True)"""
+    pip = [sys.executable, "-m", "pip", "install", "-q", "git+{repository}"]
+    subprocess.run(pip, check=True)"""
 
 
 def on_colab(path: Path) -> str:
@@ -52,8 +52,7 @@ def markdown(notebook: dict[str, Any], path: Path) -> str:
     """A notebook as Markdown whose code runs, with links in place of the first two cells."""
     title, *cells = ("".join(each["source"]) for each in notebook["cells"][2:])
     kinds = [each["cell_type"] for each in notebook["cells"][3:]]
-    download = f"{{download}}`download the notebook <{path.name}>`"
-    links = f"[Open in Colab]({on_colab(path)}), or {download}."
+    links = f"[Open in Colab]({on_colab(path)}), or [download the notebook](path:{path.name})."
     pages = [
         text if kind == "markdown" else f"<!-- run cell -->\n```python\n{text}\n```"
         for kind, text in zip(kinds, cells, strict=True)

@@ -41,5 +41,5 @@ def test_cells_become_blocks_that_run() -> None:
     cells = [*header(path), cell("markdown", "1", "# A"), cell("code", "2", "x = 1\nx")]
     page = for_site(markdown({"cells": cells}, path))
     assert page.startswith(f"# A\n\n[Open in Colab]({on_colab(path)}), or ")
-    assert "{download}`download the notebook <a.ipynb>`" in page
+    assert "[download the notebook](path:a.ipynb)" in page
     assert page.endswith("\n\n```{kinarm-run} python cell\nx = 1\nx\n```\n\n")
