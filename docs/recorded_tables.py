@@ -162,7 +162,80 @@ def factors_table() -> str:
     return markdown_table(heads, rows)
 
 
+def board() -> dict[str, Any]:
+    """The record of the leaderboard."""
+    path = RESULTS.parent / "policies" / "leaderboard.json"
+    record: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
+    return record
+
+
+def leaderboard_table() -> str:
+    """Rows of the leaderboard: by problem and success, each beside its own behind a shield."""
+    rows = board()["rows"]
+    bare = {(row["policy"], row["problem"]): row["success"][0] for row in rows}
+
+    def place(row: Mapping[str, Any]) -> tuple[Any, ...]:
+        name, problem = row["policy"].removesuffix("+shield"), row["problem"]
+        return ("left", "right", "both").index(problem), -bare[name, problem], row["policy"]
+
+    heads = ["problem", "policy", "success % (95 %)", "collision %", "replaced %", "step ratio"]
+    heads += ["seeds", "parameters", "training steps"]
+    return markdown_table(heads, map(_leaderboard_row, sorted(rows, key=place)))
+
+
+def _leaderboard_row(row: Mapping[str, Any]) -> list[str]:
+    success, *interval = (f"{100 * each:.1f}" for each in row["success"])
+    shares = (row[name] for name in ("collision", "replaced"))
+    numbers = (row["parameters"], row["training_steps"])
+    return [
+        row["problem"],
+        f"`{row['policy']}`",
+        f"{success} ({'..'.join(interval)})",
+        *("" if each is None else f"{100 * each:.1f}" for each in shares),
+        "" if row["step_ratio"] is None else f"{row['step_ratio']:.2f}",
+        str(len(row["seeds"])),
+        *("" if each is None else f"{each:,}" for each in numbers),
+    ]
+
+
+def failures_table() -> str:
+    """Causes of failure of the shipped policies on both benches, in percent of all trials."""
+    causes, shares = failures()
+    rows = [
+        [cause, *(f"{of[cause]:.2f}" if cause in of else "" for of in shares.values())]
+        for cause in causes
+    ]
+    return markdown_table(["cause", *(f"`{name}`" for name in shares)], rows)
+
+
+def watching_table() -> str:
+    """A command for each of these causes, which shows a trial of a policy that fails so."""
+    record, (causes, shares) = board(), failures()
+    options = f"--problem both --seed {record['seed']} --trials {record['trials']}"
+    found: dict[str, str] = {}
+    for row in record["rows"]:
+        if row["problem"] == "both" and row["policy"] in shares:
+            for cause, _, policy, trial in row["failures"]:
+                command = f"`kinarm-replay --policy {policy} {options} --trial {trial}`"
+                found.setdefault(cause, command)
+    return markdown_table(["cause", "to watch one"], [[cause, found[cause]] for cause in causes])
+
+
+def failures() -> tuple[list[str], dict[str, dict[str, float]]]:
+    """Causes of failure, the most frequent first; and by recipe, percent of all trials by cause."""
+    record, total, shares = board(), Counter[str](), {}
+    for row in sorted(record["rows"], key=lambda row: -row["success"][0]):
+        if row["problem"] == "both" and row["policy"].endswith("-both"):
+            faced = record["trials"] * len(row["seeds"])
+            shares[row["policy"]] = {cause: 100 * n / faced for cause, n, *_ in row["failures"]}
+            total += Counter({cause: n for cause, n, *_ in row["failures"]})
+    return [cause for cause, _ in total.most_common()], shares
+
+
 RECORDED = {
+    "leaderboard": leaderboard_table,
+    "failures": failures_table,
+    "failures-to-watch": watching_table,
     "injections": injections_table,
     "plans": plans_table,
     "servos": servos_table,

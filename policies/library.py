@@ -19,8 +19,8 @@ from kinarm.problem import ProblemLike, ReachProblem
 BEST = "best"
 """Name of the best shipped policy for a problem."""
 
-RANKING = "ranking.json"
-"""File of the best shipped policies, by docs/ranking.py."""
+LEADERBOARD = "leaderboard.json"
+"""File of what policies reach and which shipped ones are best, by docs/leaderboard.py."""
 
 SEEN = 10_000
 """Weight of an initial policy's statistics, in observations; new ones soon outweigh it."""
@@ -50,8 +50,8 @@ def best_policy(problem: ProblemLike | None) -> str:
     if problem is None:
         raise InvalidInputError(f"{BEST!r} is the best policy for a problem: name a --problem")
     wanted = ReachProblem.load(problem)
-    ranking = resources.files("kinarm.data") / "policies" / RANKING
-    best: dict[str, str] = json.loads(ranking.read_text(encoding="utf-8"))["best"]
+    board = resources.files("kinarm.data") / "policies" / LEADERBOARD
+    best: dict[str, str] = json.loads(board.read_text(encoding="utf-8"))["best"]
     for trained_for, name in best.items():
         other = ReachProblem.load(trained_for)
         same_goals = set(other.task.goal_regions) == set(wanted.task.goal_regions)

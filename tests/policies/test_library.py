@@ -80,7 +80,7 @@ def test_every_shipped_policy_loads_and_fits_its_arm(shipped_arms):
 def ranked(shipped):
     """Some of them are ranked, on two problems."""
     best = {"right": NAMES[2], "both": "ppo-both"}
-    (shipped / "ranking.json").write_text(json.dumps({"best": best}))
+    (shipped / "leaderboard.json").write_text(json.dumps({"best": best}))
     (shipped.parent / "arms").symlink_to(Path(kinarm.data.__file__).parent / "arms")
     return shipped
 

@@ -1,0 +1,232 @@
+"""The leaderboard: ``python -m docs.leaderboard`` scores all that ships or was submitted.
+
+``python -m docs.leaderboard data/leaderboard/mine.toml`` scores this submission alone, and leaves
+other rows as they are. The record lies beside the shipped policies; `docs.tables` makes pages of
+it, and `kinarm.policies.library.best_policy` looks the best shipped policy up. The trials have
+their own seed, so that no policy is chosen by the trials that evaluations show.
+
+The best: the seed that reaches most goals of all is partly the luckiest, and more seeds have more
+luck. So recipes are compared first, by what all their seeds reach; then the seeds of the best
+recipe. Both times the order is the same. The first is the one that reaches most goals. As good is
+what lies within its 95 % interval: the first itself might reach no more with other trials, and as a
+recipe with other seeds. A wide interval of another one does not count in its favour. Of those that
+are as good, the one with the smallest step ratio is best.
+"""
+
+import json
+import sys
+from collections import Counter
+from collections.abc import Iterable, Mapping, Sequence
+from contextlib import chdir
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from kinarm._fields import Checked, from_plain, read_toml
+from kinarm._files import first_line, write_text
+from kinarm.episodes import Rollouts
+from kinarm.errors import FROM_ZERO, InvalidInputError
+from kinarm.evaluation import EvaluationRequest, find_contestants
+from kinarm.evaluation.contestants import ORACLE, SHIELDED
+from kinarm.evaluation.evaluation import Evaluation, outcomes_of
+from kinarm.evaluation.metrics import METRICS
+from kinarm.evaluation.outcomes import Outcomes, failure_causes
+from kinarm.evaluation.statistics import share_over_seeds
+from kinarm.evaluation.summary import pool
+from kinarm.policies.library import LEADERBOARD, group_of
+from kinarm.policies.oracle import OracleSolutions
+from kinarm.problem import PROBLEMS
+
+DATA = Path(__file__).parent.parent / "data"
+RECORD = DATA / "policies" / LEADERBOARD
+SUBMISSIONS = DATA / "leaderboard"
+
+TRIALS, SEED = 10_000, 20_161
+"""The held trials of each problem: nothing else draws from this seed."""
+
+FIGURES = ("collision", "step_ratio", "replaced")
+"""Figures of a row, beside success and its interval."""
+
+MOST_CAUSES = 8
+"""Causes of failure that a row lists."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Submission(Checked):
+    """What a file of TOML submits; a policy file needs none.
+
+    Parameters
+    ----------
+    policy : str
+        As `kinarm-eval` takes it, from the file's folder: ``module:function``, ...
+    problems : tuple of str
+        Which of the paper's problems it faces.
+    wrapper : str, optional
+        ``module:function`` from an environment to the one that it acts in.
+    parameters, training_steps : int, optional
+        Its numbers, and environment steps of its training; policy files say both.
+    """
+
+    policy: str
+    problems: tuple[str, ...] = tuple(PROBLEMS)
+    wrapper: str | None = None
+    parameters: int | None = field(default=None, metadata=FROM_ZERO)
+    training_steps: int | None = field(default=None, metadata=FROM_ZERO)
+
+    @classmethod
+    def read(cls, file: Path) -> "Submission":
+        """Read a file of TOML, or describe a policy file."""
+        if file.suffix == ".toml":
+            made = from_plain(cls, read_toml(file, "submission"), "submission")
+        else:
+            (contestant,) = find_contestants(file)
+            served = (name for name, problem in PROBLEMS.items() if contestant.serves(problem))
+            made = cls(policy=file.name, problems=tuple(served))
+        if not made.problems or not PROBLEMS.keys() >= {*made.problems}:
+            wanted = ", ".join(PROBLEMS)
+            raise InvalidInputError(f"it faces none of the problems, or others than {wanted}")
+        return made
+
+    def rows(self, name: str, trials: int) -> list[dict[str, Any]]:
+        """Its rows, bare and behind a shield, under a name."""
+        request = EvaluationRequest(
+            policies=(self.policy,),
+            problems=self.problems,
+            wrapper=self.wrapper,
+            trials=trials,
+            seed=SEED,
+            shield=True,
+        )
+        faced = [each for each in request.evaluate() if each.contestant is not ORACLE]
+        rows = rows_of(faced)
+        for row in rows:
+            row["policy"] = name + SHIELDED * (SHIELDED in row["policy"])
+            for said in ("parameters", "training_steps"):
+                row[said] = row[said] if getattr(self, said) is None else getattr(self, said)
+        return rows
+
+
+def rows_of(evaluations: Sequence[Evaluation]) -> list[dict[str, Any]]:
+    """Rows of the leaderboard: training seeds of a recipe share one."""
+    pooled = pool(evaluations)
+    members = {member for group in pooled for member in group.members}
+    alone = [each for each in evaluations if each not in members]
+    return [_row(each.name, each.members) for each in (*pooled, *alone)]
+
+
+def _row(name: str, members: Sequence[Evaluation]) -> dict[str, Any]:
+    policy, outcomes = members[0].contestant.policy, outcomes_of(members)
+    hits = np.array([each.rollouts.success for each in members])
+    return {
+        "policy": name,
+        "problem": members[0].problem.name,
+        "success": [float(hits.mean()), *(share_over_seeds(hits).ci95 or ())],
+        **{figure: METRICS[figure].formula(outcomes) for figure in FIGURES},
+        "seeds": {
+            each.contestant.name: [
+                float(each.rollouts.success.mean()),
+                METRICS["step_ratio"].formula(outcomes_of([each])),
+            ]
+            for each in members
+        },
+        "parameters": policy and sum(each.size for each in policy.networks().parameters),
+        "training_steps": policy and policy.provenance.environment_steps,
+        "failures": _failures(members),
+    }
+
+
+def _failures(members: Iterable[Evaluation]) -> list[list[Any]]:
+    """Causes of failure: how many trials, and a policy and trial to watch."""
+    counts: Counter[str] = Counter()
+    first: dict[str, tuple[str, int]] = {}
+    for each in members:
+        ends = (each.outcomes, each.rollouts.steps.tolist(), each.contacts)
+        for trial, cause in failure_causes(*ends).items():
+            counts[str(cause)] += 1
+            first.setdefault(str(cause), (each.contestant.name, trial))
+    return [[cause, n, *first[cause]] for cause, n in counts.most_common(MOST_CAUSES)]
+
+
+def scored(files: Sequence[Path], trials: int = TRIALS) -> tuple[list[dict[str, Any]], bool]:
+    """Rows of submissions, and whether all could be scored; why one cannot is told in one line.
+
+    Parameters
+    ----------
+    files, trials : sequence of Path, int
+        Files of `SUBMISSIONS`, and how many trials each faces on a problem.
+    """
+    rows, whole = [], True
+    for file in files:
+        try:
+            with chdir(file.parent):
+                rows += Submission.read(Path(file.name)).rows(file.stem, trials)
+        except Exception as error:  # a policy may raise anything
+            sys.stderr.write(f"{file.name}: {first_line(error)}\n")
+            whole = False
+    return rows, whole
+
+
+def best_of(found: Mapping[str, Rollouts], bounds: OracleSolutions) -> str:
+    """Name of the best of some policies: of the best recipe, the best seed.
+
+    Parameters
+    ----------
+    found : mapping of str to Rollouts
+        What each did in the same trials, by its name.
+    bounds : OracleSolutions
+        Of the first trials.
+    """
+    recipes: dict[str, dict[str, Rollouts]] = {}
+    for name, did in found.items():
+        recipes.setdefault(group_of(name), {})[name] = did
+    recipe = _leader({name: list(seeds.values()) for name, seeds in recipes.items()}, bounds)
+    return _leader({name: [did] for name, did in recipes[recipe].items()}, bounds)
+
+
+def _leader(candidates: Mapping[str, list[Rollouts]], bounds: OracleSolutions) -> str:
+    """The best candidate, of each of which there are one or several training seeds."""
+    names = sorted(candidates)
+    hits = {name: np.array([did.success for did in candidates[name]]) for name in names}
+    shares = {name: float(hits[name].mean()) for name in names}
+    first = max(names, key=lambda name: shares[name])
+    low, _ = share_over_seeds(hits[first]).ci95 or (shares[first], shares[first])
+    as_good = [name for name in names if shares[name] >= low]
+    ratio = METRICS["step_ratio"].formula
+    ratios = {name: ratio(Outcomes(tuple(candidates[name]), bounds)) or np.inf for name in as_good}
+    return min(as_good, key=lambda name: (ratios[name], -shares[name]))
+
+
+def best(evaluations: Iterable[Evaluation]) -> dict[str, str]:
+    """Name of the best policy of each problem."""
+    faced: dict[str, dict[str, Evaluation]] = {}
+    for each in evaluations:
+        if each.contestant.policy is not None and not each.contestant.has_shield:
+            faced.setdefault(each.problem.name, {})[each.contestant.name] = each
+    return {
+        problem: best_of({name: each.rollouts for name, each in found.items()}, bounds)
+        for problem, found in faced.items()
+        if (bounds := next(iter(found.values())).bounds) is not None
+    }
+
+
+def main(files: Sequence[Path]) -> None:
+    """Score, and write the record; submissions alone if some are named."""
+    submitted = sorted(each for each in SUBMISSIONS.iterdir() if each.suffix in (".toml", ".npz"))
+    rows, whole = scored(files or submitted)
+    if files:
+        record = json.loads(RECORD.read_text("utf-8"))
+        again = {(row["policy"], row["problem"]) for row in rows}
+        kept = [row for row in record["rows"] if (row["policy"], row["problem"]) not in again]
+        record["rows"] = [*kept, *rows]
+    else:
+        shipped = EvaluationRequest(trials=TRIALS, seed=SEED, shield=True).evaluate()
+        record = {"trials": TRIALS, "seed": SEED, "best": best(shipped)}
+        record["rows"] = [*rows_of(shipped), *rows]
+    write_text(RECORD, json.dumps(record, indent=1) + "\n")
+    sys.exit(not whole)
+
+
+if __name__ == "__main__":
+    main([Path(each).resolve() for each in sys.argv[1:]])

@@ -1,0 +1,129 @@
+"""The leaderboard: its record, what submissions come to, and which shipped policy is best."""
+
+import json
+import re
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from docs import leaderboard
+from docs.leaderboard import RECORD, SUBMISSIONS, best_of, scored
+from kinarm.evaluation import evaluate
+from kinarm.policies import load_policy, policy_names
+from kinarm.policies.library import best_policy, group_of
+from kinarm.problem import PROBLEMS
+
+
+@pytest.fixture(scope="module")
+def recorded():
+    return json.loads(RECORD.read_text(encoding="utf-8"))
+
+
+def test_every_shipped_policy_and_submission_has_rows(recorded):
+    """After shipping others: ``python -m docs.leaderboard``."""
+    rows = {(row["policy"], row["problem"]): row for row in recorded["rows"]}
+    for name in policy_names():
+        # What ships for all problems is symmetric.
+        problems = PROBLEMS if "paper" not in name else [name.split("-")[2]]
+        for problem in problems:
+            bare = rows[group_of(name), problem]
+            shielded = rows[f"{group_of(name)}+shield", problem]
+            assert name in bare["seeds"]
+            assert len(shielded["seeds"]) == len(bare["seeds"])
+    submitted = {each.stem for each in SUBMISSIONS.iterdir() if each.suffix in (".npz", ".toml")}
+    assert submitted
+    assert {name for name, _ in rows} >= submitted | {f"{name}+shield" for name in submitted}
+    assert (recorded["trials"], recorded["seed"]) == (leaderboard.TRIALS, leaderboard.SEED)
+
+
+@pytest.mark.slow
+def test_the_best_are_measured_again(recorded):
+    assert recorded["best"] == {problem: best_policy(problem) for problem in PROBLEMS}
+    for problem, name in recorded["best"].items():
+        assert re.match(r"ppo-(best|precise)-both-seed\d", name)
+        again = evaluate(name, problem, leaderboard.TRIALS, leaderboard.SEED, oracle=True)
+        (row,) = (
+            row
+            for row in recorded["rows"]
+            if (row["policy"], row["problem"]) == (group_of(name), problem)
+        )
+        found = [again.metrics[figure].value for figure in ("success", "step_ratio")]
+        assert row["seeds"][name] == found
+
+
+class TestSubmissions:
+    TOY = "import numpy\ndef act(observations):\n    return numpy.zeros((len(observations), 5))\n"
+
+    def submitted(self, folder, text):
+        (folder / "toy_submission.py").write_text(self.TOY)
+        (folder / "mine.toml").write_text(text)
+        return folder / "mine.toml"
+
+    def test_a_function_is_scored_bare_and_behind_a_shield(self, tmp_path):
+        text = 'policy = "toy_submission:act"\nproblems = ["right"]\ntraining_steps = 7\n'
+        rows, whole = scored([self.submitted(tmp_path, text)], 4)
+        assert whole
+        assert [row["policy"] for row in rows] == ["mine", "mine+shield"]
+        for row in rows:
+            assert (row["problem"], row["training_steps"]) == ("right", 7)
+            assert row["success"][0] == row["collision"] == 0
+            assert row["failures"] == [["truncated", 4, next(iter(row["seeds"])), 0]]
+
+    def test_a_policy_file_says_what_it_is_for(self, tmp_path):
+        policy = load_policy("ars-linear-both-seed0")
+        policy.save(tmp_path / "mine.npz")
+        rows, whole = scored([tmp_path / "mine.npz"], 4)
+        assert whole
+        assert {(row["policy"], row["problem"]) for row in rows} == {
+            (name, problem) for name in ("mine", "mine+shield") for problem in PROBLEMS
+        }
+        steps, numbers = policy.provenance.environment_steps, 5 * 49
+        assert {(row["training_steps"], row["parameters"]) for row in rows} == {(steps, numbers)}
+
+    @pytest.mark.parametrize(
+        ("text", "why"),
+        [
+            ('policy = "toy_submission:other"', "toy_submission"),
+            ('policy = "toy_submission:act"\nproblems = ["moon"]', "left, right, both"),
+            ('policy = "toy_submission:act"\nseed = 3', "unknown key 'seed'"),
+            ("policy = ", "mine.toml"),
+        ],
+    )
+    def test_a_broken_one_gets_one_line(self, tmp_path, capsys, text, why):
+        assert scored([self.submitted(tmp_path, text)], 4) == ([], False)
+        (line,) = capsys.readouterr().err.splitlines()
+        assert line.startswith("mine.toml: ")
+        assert why in line
+
+
+N_TRIALS = 1000
+BOUNDS = SimpleNamespace(steps_lower_bound=np.full(N_TRIALS // 5, 10))
+
+
+def made_up(share, steps, shift=0):
+    """A policy that succeeds in a share of the trials, after so many steps."""
+    success = np.arange(N_TRIALS) < round(share * N_TRIALS)
+    return SimpleNamespace(success=np.roll(success, shift), steps=np.full(N_TRIALS, steps))
+
+
+def test_seeds_that_are_lucky_do_not_make_a_recipe():
+    found = {
+        **{f"even-seed{k}": made_up(0.90 + 0.002 * k, 20) for k in range(4)},
+        **{f"odd-seed{k}": made_up(share, 12) for k, share in enumerate((0.95, 0.3, 0.2, 0.4))},
+        "one-seed0": made_up(0.7, 10),
+    }
+    assert best_of(found, BOUNDS).startswith("even")
+
+
+def test_among_equally_good_ones_the_fastest_is_best():
+    slow = {f"slow-seed{k}": made_up(0.90 + 0.01 * k, 20) for k in range(4)}
+    fast = {f"fast-seed{k}": made_up(0.89 + 0.01 * k, 15 - (k == 2)) for k in range(4)}
+    assert best_of(slow | fast, BOUNDS) == "fast-seed2"
+    worse = {name: made_up(0.8, 10) for name in fast}
+    assert best_of(slow | worse, BOUNDS).startswith("slow")
+
+
+def test_with_equal_steps_more_goals_decide():
+    found = {f"mine-seed{k}": made_up(share, 20) for k, share in enumerate((0.9, 0.901, 0.899))}
+    assert best_of(found, BOUNDS) == "mine-seed1"
