@@ -107,7 +107,7 @@ class Networks:
     mirror : Mirror or None
         Reflection of goals on the left, and of actions; None for no reflection.
     rates : int
-        First entry of ``resolved_rate``, to which outputs are added; see `Control`.
+        First entry of ``resolved_rate``, to which outputs are added; -1 for none.
     """
 
     layers: tuple[Layer, ...]

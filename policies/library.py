@@ -124,10 +124,11 @@ def layer_widths(problem: ReachProblem, hidden: Sequence[int] = ()) -> tuple[int
     return (ObservationLayout.of(problem, arm).size, *hidden, arm.n_actuated)
 
 
-def starting_policy(name_or_file: str, widths: Sequence[int]) -> Policy:
+def starting_policy(name_or_file: str, widths: Sequence[int], residual: bool = False) -> Policy:
     """Load a policy to begin a training with, of any arm and problem.
 
-    Its layers must have the training's widths, from observation to action, and functions.
+    Its layers must have the training's widths, from observation to action, and functions; and
+    either both are residual, or neither.
     """
     policy = load_policy(name_or_file)
     found = (policy.n_observations, *(len(layer.bias) for layer in policy.layers))
@@ -135,6 +136,11 @@ def starting_policy(name_or_file: str, widths: Sequence[int]) -> Policy:
         layers, wanted = ("-".join(map(str, each)) for each in (found, widths))
         raise InvalidInputError(
             f"initial_policy {name_or_file!r} has layers {layers}, the training {wanted}"
+        )
+    if policy.residual != residual:
+        kinds = [("" if each else "not ") + "residual" for each in (policy.residual, residual)]
+        raise InvalidInputError(
+            f"initial_policy {name_or_file!r} is {kinds[0]}, the training is {kinds[1]}"
         )
     usual = (*("tanh",) * (len(policy.layers) - 1), "linear")
     if policy.activations != usual:

@@ -54,7 +54,7 @@ class Policy:
     shield : bool
         Whether a simulator replaces its steps that would touch; see `shielded`.
     residual : bool
-        Whether outputs are added to ``resolved_rate``; see `PPOConfig`.
+        Whether outputs are added to ``resolved_rate``, as `kinarm.policies.PPOConfig` says.
     """
 
     mean: NDArray[np.float64]
