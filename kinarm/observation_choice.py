@@ -1,6 +1,6 @@
 """Which parts of the observation a problem shows; the parts are in `kinarm.observation`."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, cast
 
@@ -11,13 +11,8 @@ from kinarm.goals import GOAL_RESTS, REST_ERRORS, REST_PARTS
 PAPER_PARTS = ("goal", "goal_minus_tool", "orientation", "position")
 """The paper's observation (section 3.2)."""
 
-PARTS = (
-    *(*PAPER_PARTS, "resolved_rate", "joint_positions", "joint_angles", "joint_velocities"),
-    *("last_action", "commanded", "time_left", "proximity", "obstacles"),
-    *GOAL_RESTS,
-    *REST_ERRORS,
-)
-"""Names of all parts."""
+CERTAIN = (*PAPER_PARTS, *GOAL_RESTS, *REST_ERRORS, "resolved_rate")
+"""Parts that recipes name: to know these, no table is loaded, and no Numba."""
 
 LONGEST_HISTORY, MOST_SLOTS = 32, 32
 
@@ -47,11 +42,16 @@ class Observation(Checked):
         super().__post_init__()
         if self.parts is None:
             return
+        available: Sequence[str] = CERTAIN
+        if not self.parts or not {*CERTAIN}.issuperset(self.parts):
+            from kinarm.observation import OBSERVATION  # loads Numba
+
+            available = [part.name for part in OBSERVATION]
         if not self.parts:
-            raise ProblemError(f"an observation needs parts; available: {', '.join(PARTS)}")
+            raise ProblemError(f"an observation needs parts; available: {', '.join(available)}")
         for name in self.parts:
-            if name not in PARTS:
-                raise UnknownNameError("part of the observation", name, PARTS)
+            if name not in available:
+                raise UnknownNameError("part of the observation", name, available)
             if self.parts.count(name) > 1:
                 raise ProblemError(f"the observation has the part {name!r} twice")
 
