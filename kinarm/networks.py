@@ -15,7 +15,6 @@ from numpy.typing import ArrayLike, NDArray
 from kinarm.episodes import Control
 from kinarm.errors import InvalidInputError, UnknownNameError, finite_array
 from kinarm.kernels.compiling import Array
-from kinarm.kernels.network import LEAK
 
 
 @runtime_checkable
@@ -26,18 +25,8 @@ class CompiledPolicy(Protocol):
         """The policy and its normaliser as a batch of one network."""
 
 
-ACTIVATIONS: dict[str, Callable[[Array], Array]] = {
-    "linear": lambda values: values,
-    "tanh": np.tanh,
-    "relu": lambda values: np.maximum(values, 0.0),
-    "hardtanh": lambda values: np.clip(values, -1.0, 1.0),
-    "elu": lambda values: np.where(values < 0, np.expm1(np.minimum(values, 0.0)), values),
-    "leaky_relu": lambda values: np.where(values < 0, LEAK * values, values),
-    "silu": lambda values: values * (0.5 + 0.5 * np.tanh(0.5 * values)),
-}
-"""Activation functions by name, in the order of `kinarm.episodes`."""
-
 Activation = Literal["linear", "tanh", "relu", "hardtanh", "elu", "leaky_relu", "silu"]
+"""Functions after layers, in the order of `kinarm.episodes`."""
 
 
 class Layer(NamedTuple):
@@ -248,7 +237,7 @@ def network_control(
         layers=np.array(networks.widths),
         weights=networks.parameters,
         policy=index.astype(np.int64),
-        activations=np.array([[*ACTIVATIONS].index(name) for name in networks.activations]),
+        activations=np.array([get_args(Activation).index(name) for name in networks.activations]),
         rates=networks.rates,
     )
     if networks.mirror is None:
@@ -262,7 +251,7 @@ def network_control(
 def checked_activations(given: Sequence[Activation], n_layers: int) -> tuple[Activation, ...]:
     """Functions after some layers: as given, or the usual ones."""
     for name in given:
-        if name not in ACTIVATIONS:
+        if name not in get_args(Activation):
             raise UnknownNameError("activation function", str(name), get_args(Activation))
     if not given:
         between: tuple[Activation, ...] = ("tanh",)

@@ -65,7 +65,7 @@ def export_policy(
     Parameters
     ----------
     policy : Policy
-        A policy that sees neither bodies of the scene nor ``resolved_rate``.
+        A policy that does not see bodies of the scene.
     folder : str or Path
         Where to, a new folder.
     overwrite : bool

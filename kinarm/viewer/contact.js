@@ -3,7 +3,7 @@
 /* ---------- contact: distances between convex shapes by Gilbert, Johnson and Keerthi's way ---------- */
 
 const CLOSE = 5e-7; // bodies this far apart touch: half of the distance that Coal may take for none [m]
-const TOUCHING = 1e-6; // bodies that come this close in a motion touch, as in `kinarm.motion_contact` [m]
+const TOUCHING = 1e-6; // bodies that come this close in a motion touch, as in `kinarm.step_contact` [m]
 const TOLD_APART = 2.5e-7; // distances that differ less are the same there [m]
 const NARROW = 1e-10; // bounds of a distance that are this close decide [m]
 const MOST_CUTS = 200;

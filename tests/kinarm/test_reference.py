@@ -8,7 +8,8 @@ import pytest
 from reference_episodes import assert_equal_outcome, compare_actions, scripted
 from simulators import changed
 
-from kinarm.networks import ACTIVATIONS, Layer, Networks, split_parameters
+from kinarm.networks import Layer, Networks, split_parameters
+from kinarm.policies.arm_policy import activated
 from kinarm.policies.library import load_policy
 from kinarm.problem import ReachProblem
 from kinarm.reference import ReferenceSimulator
@@ -67,7 +68,8 @@ def evaluate(networks, index, observation):
     left = mirror is not None and observation[1] > 0
     x = mirror.observations * x if left else x
     for layer, name in zip(networks.layers, networks.activations, strict=True):
-        x = ACTIVATIONS[name](np.einsum("ji,i->j", layer.weights[index], x) + layer.bias[index])
+        x = np.einsum("ji,i->j", layer.weights[index], x) + layer.bias[index]
+        x = activated(np, name, x)
     action = np.clip(x, -1, 1)
     return mirror.actions * action if left else action
 
