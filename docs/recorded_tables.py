@@ -141,7 +141,7 @@ def plans_table() -> str:
 def factors_table() -> str:
     """What a change of a recipe is worth, in percentage points of success."""
     rows = []
-    for name in ("ars_factors", "teacher"):
+    for name in ("ars_factors",):
         record = json.loads((RESULTS / name / "learners.json").read_text(encoding="utf-8"))
         titles = {each["name"]: each["title"] for each in record["learners"]}
         first, *others = record["results"]

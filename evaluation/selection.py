@@ -71,7 +71,8 @@ def _changed(request: "EvaluationRequest", problem: ReachProblem) -> ReachProble
 def _shipped(request: "EvaluationRequest", named: list[ReachProblem]) -> list[Contestant]:
     """Shipped policies for the arm and the named problems; then the baselines.
 
-    Names say what policies were trained for: others are not opened.
+    Those of recipes `BEST` come behind a shield, too. Names say what policies were trained for:
+    others are not opened.
     """
     serving = {
         name
@@ -85,7 +86,8 @@ def _shipped(request: "EvaluationRequest", named: list[ReachProblem]) -> list[Co
         if group_of(name).rpartition("-")[2] in serving
         for contestant in find_contestants(name)
     ]
-    return [*shipped, *BASELINES.values()]
+    behind = [each.shielded() for each in shipped if each.recipe == BEST]
+    return [*shipped, *behind, *BASELINES.values()]
 
 
 def _named_contestants(request: "EvaluationRequest", named: list[ReachProblem]) -> list[Contestant]:

@@ -309,8 +309,10 @@ def _trailing_idle_axes(model: pin.Model, chain: Chain) -> int:
 def _n_actuated(
     named: tuple[str, ...] | None, model: pin.Model, chain: Chain, description: Description
 ) -> int:
-    """Number of actuated joints: those named, or all that move the tool."""
+    """Number of actuated joints: those named, all, or by default all that move the tool."""
     names = list(model.names)[1:]
+    if named == ():
+        return chain.n_joints
     if named is None:
         n_actuated = chain.n_joints - _trailing_idle_axes(model, chain)
         if n_actuated == 0:
@@ -319,9 +321,9 @@ def _n_actuated(
                 f"{description.tool_frame!r}"
             )
         return n_actuated
-    if not named or list(named) != names[: len(named)]:
+    if list(named) != names[: len(named)]:
         raise ArmError(
             f"actuated must name the first joints of {description.path.name} in their order, "
-            f"{', '.join(names)}; got {', '.join(named) or 'none'} (held locks others)"
+            f"{', '.join(names)}; got {', '.join(named)} (held locks others)"
         )
     return len(named)

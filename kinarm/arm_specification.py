@@ -56,9 +56,9 @@ class ArmSpecification(Checked):
         Folders that hold the packages which ``package://`` mesh names refer to;
         the folders around the URDF are searched, too.
     actuated : tuple of str
-        Names of the joints that actions move, from the base on; by default all
-        but the trailing ones that cannot move the tool point. The others stay
-        at home.
+        Names of the joints that actions move, from the base on; empty for all.
+        By default all but the trailing ones that cannot move the tool point, or
+        all if goals are poses. The others stay at home.
     held : dict
         Positions of joints that are locked, by name [rad or m]; those that do
         not carry the tool are locked anyway, where the URDF has them at zero or

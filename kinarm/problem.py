@@ -63,6 +63,9 @@ class ReachProblem(Checked):
         super().__post_init__()
         if self.observation.parts == PAPER_PARTS:  # which is the default
             object.__setattr__(self, "observation", replace(self.observation, parts=None))
+        if self.task.goal.kind == "pose" and self.arm.actuated is None:
+            # Also joints that turn the tool in place.
+            object.__setattr__(self, "arm", replace(self.arm, actuated=()))
         available = [region.name for region in self.scene.goal_regions]
         if not available:
             raise ProblemError("a scene needs at least one goal region")

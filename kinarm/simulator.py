@@ -89,13 +89,9 @@ class Simulator(EpisodeRunner):
         other.world = world
         return other
 
-    def with_tolerance(
-        self, tolerance: float, rotation_tolerance: float | None = None
-    ) -> "Simulator":
-        """Another simulator of the same world with other tolerances [m, and rad or m]."""
-        goal = {"rotation_tolerance": rotation_tolerance}
-        changed = {} if rotation_tolerance is None else {"goal": goal}
-        return self._in(self.world.changed(tolerance=tolerance, **changed))
+    def with_tolerance(self, tolerance: float) -> "Simulator":
+        """Another simulator of the same world with another tolerance [m]."""
+        return self._in(self.world.changed(tolerance=tolerance))
 
     def in_scene(self, start: ArrayLike, goal: ArrayLike) -> "Simulator":
         """The simulator of one episode; see `kinarm.World.in_scene`."""

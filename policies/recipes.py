@@ -135,9 +135,8 @@ def _adapted(config: ConfigT, apart: Mapping[str, ConfigT]) -> ConfigT:
     if different_regions(problem, symmetric) > 1:
         config = replace(apart[config.recipe], problem=problem, seed=config.seed)
     scale = problem.task.tolerance / PROBLEMS["right"].task.tolerance
-    for name in ("initial_tolerance", "training_tolerance"):
-        if (length := getattr(config, name, None)) is not None:
-            changes[name] = round(scale * length, 9)
+    if (length := getattr(config, "training_tolerance", None)) is not None:
+        changes["training_tolerance"] = round(scale * length, 9)
     weights = config.training_problem.task.reward
     relative = round(problem.load_arm().reach / RECIPE_REACH, 2)
     changes["reward"] = replace(weights, progress=weights.progress / relative)

@@ -29,7 +29,6 @@ Array = NDArray[np.float64]
 
 POLICIES = (
     "ppo-best-both-seed0",
-    "ppo-precise-both-seed0",
     "ars-best-both-seed0",
     "ars-linear-both-seed0",
 )

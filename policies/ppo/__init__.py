@@ -1,6 +1,5 @@
 """Proximal Policy Optimization: settings, state of a training, and learner."""
 
-import math
 from dataclasses import dataclass, field
 from typing import ClassVar, NamedTuple
 
@@ -72,9 +71,6 @@ class PPOConfig(TrainingConfig):
     training_tolerance : float, optional
         Distance that counts as a success in the training [m]; by default the
         task's tolerance.
-    initial_tolerance : float, optional
-        Training tolerance until start spread and discount are final; then it
-        changes geometrically [m].
     training_hold : int, optional
         Steps in a row within the tolerance that a success in the training takes;
         by default the task's.
@@ -101,7 +97,7 @@ class PPOConfig(TrainingConfig):
     widening : float
         Share of the training in which spread and discount change linearly.
     settled : float
-        Share of the training after which noise and tolerance are final.
+        Share of the training after which the noise is final.
     replay_share : float
         Probability that an episode begins where an earlier one failed; see
         `kinarm.failed_scenarios`.
@@ -111,13 +107,9 @@ class PPOConfig(TrainingConfig):
         Smallest logarithm of the standard deviation in replayed episodes: with
         less noise, a policy never succeeds where it always fails. By default
         there is none.
-    replay_noise_steps : int, optional
-        First steps of a replayed episode that have that noise; by default all.
     initial_policy : str, optional
         Name or file of a policy to begin with; it must have the same layers,
         and may be for another problem or arm.
-    demonstrations : int
-        Trials that the oracle solves first; the actor imitates its motions.
     """
 
     iterations: int = 600
@@ -138,7 +130,6 @@ class PPOConfig(TrainingConfig):
     log_std_init: float = 0.0
     final_log_std: float | None = field(default=None, metadata=OPTIONAL)
     training_tolerance: float | None = field(default=None, metadata=POSITIVE)
-    initial_tolerance: float | None = field(default=None, metadata={**POSITIVE, **OPTIONAL})
     training_hold: int | None = field(default=None, metadata={**MANY, **OPTIONAL})
     training_speed: float | None = field(default=None, metadata={**POSITIVE, **OPTIONAL})
     residual: bool = field(default=False, metadata=OPTIONAL)
@@ -152,9 +143,7 @@ class PPOConfig(TrainingConfig):
     replay_share: float = field(default=0.0, metadata={**SHARE, **OPTIONAL})
     replay_size: int = field(default=8192, metadata={"at_most": LARGEST_REPLAY, **OPTIONAL})
     replay_log_std: float | None = field(default=None, metadata=OPTIONAL)
-    replay_noise_steps: int | None = field(default=None, metadata={**MANY, **OPTIONAL})
     initial_policy: str | None = field(default=None, metadata=OPTIONAL)
-    demonstrations: int = field(default=0, metadata={"at_least": 0, **MANY, **OPTIONAL})
 
     learner = "ppo"
 
@@ -164,10 +153,8 @@ class PPOConfig(TrainingConfig):
         "training_tolerance": "the task's",
         "training_hold": "the task's",
         "training_speed": "the task's",
-        "initial_tolerance": "the training tolerance",
         "initial_gamma": "gamma",
         "replay_log_std": "none, noise as in others",
-        "replay_noise_steps": "all",
     }
     """Meaning of leaving out an option that has no default value."""
 
@@ -181,8 +168,6 @@ class PPOConfig(TrainingConfig):
             object.__setattr__(self, "problem", self.problem.replace(observation=[*parts]))
         if self.replay_log_std is not None and not self.replay_share:
             raise InvalidInputError("replay_log_std needs a replay_share above 0")
-        if self.replay_noise_steps is not None and self.replay_log_std is None:
-            raise InvalidInputError("replay_noise_steps needs a replay_log_std")
         if self.batch_size == 1 or self.steps_per_iteration % self.batch_size:
             raise InvalidInputError(
                 f"batch_size must be above 1 and divide the {self.steps_per_iteration} steps of a "
@@ -212,7 +197,7 @@ class PPOConfig(TrainingConfig):
     def can_extend(self) -> bool:
         """Whether a longer training begins just as this one goes."""
         settled = self.widening == 0 and self.initial_penalty == 1
-        unset = self.final_log_std is None and self.initial_tolerance is None
+        unset = self.final_log_std is None
         return self.learning_rate_schedule == "constant" and settled and unset
 
     def start_spread_at(self, done: float) -> float:
@@ -231,18 +216,6 @@ class PPOConfig(TrainingConfig):
             return None
         settled = min(1.0, done / self.settled)
         return (1 - settled) * self.log_std_init + settled * self.final_log_std
-
-    def tolerance_at(self, done: float) -> float:
-        """Distance that counts as a success after this share of the training [m]."""
-        own, initial = self.training_tolerance, self.initial_tolerance
-        final = self.problem.task.tolerance if own is None else own
-        if initial is None or done >= self.settled:
-            return final
-        if done <= self.widening:
-            return initial
-        fallen = (done - self.widening) / (self.settled - self.widening)
-        # Rounded, for powers differ between C libraries.
-        return round(initial * math.pow(final / initial, fallen), 9)
 
     def penalty_at(self, done: float) -> float:
         """Share of the penalty for contact that counts after this share of the training."""

@@ -27,6 +27,8 @@ class TrainingArms:
     ----------
     failed : FailedScenarios
         What may be replayed.
+    replayed : ndarray of bool, shape (n_envs,)
+        Which arms replay it, with the noise of replays.
     returns, successes : list of ndarray
         Of episodes that ended since `restore`, but for replays.
     cut_short, finals : list of ndarray
@@ -42,18 +44,6 @@ class TrainingArms:
         self.simulator = config.simulator(threads=1)
         self.mirror = problem_mirror(config.problem) if config.symmetric else None
 
-    def reach_within(self, tolerance: float) -> None:
-        """Count this distance [m] as a success in episodes restored later.
-
-        The tolerance of rotations is as many times the task's.
-        """
-        if tolerance == self.simulator.task.tolerance:
-            return
-        task, turn = self.config.training_problem.task, None
-        if task.goal.number:
-            turn = round(task.goal.rotation_tolerance * tolerance / task.tolerance, 9)
-        self.simulator = self.simulator.with_tolerance(tolerance, turn)
-
     def sample(
         self, rng: np.random.Generator, count: int, start_spread: float | None = None
     ) -> StartsAndGoals:
@@ -67,14 +57,13 @@ class TrainingArms:
         self._rng, self._start_spread = rng, config.start_spread_at(done)
         self._remitted = 1.0 - config.penalty_at(done)
         self._mean, self._scale = state.normalizer.mean, input_scale(state.normalizer.std)
-        self.reach_within(config.tolerance_at(done))
         begun = EpisodeStates._make(map(np.copy, state.episodes))
         scenarios, start, taken = (begun.q, begun.goal), begun.start, begun.steps
         kept = begun.done.T if len(begun.done) else None
         self.episodes = self.simulator.reset(
             *scenarios, origins=start, taken=taken, drive=begun.drive, done=kept
         )
-        self._total, self._start, self._replayed = begun.total, begun.start, begun.replayed
+        self._total, self._start, self.replayed = begun.total, begun.start, begun.replayed
         self.failed, self.time = state.failed, 0.0
         self.returns: list[NDArray[np.float64]] = []
         self.successes: list[NDArray[np.bool_]] = []
@@ -83,7 +72,7 @@ class TrainingArms:
 
     def states(self) -> EpisodeStates:
         """Copy the state of running episodes."""
-        episodes, ours = self.episodes, (self._total, self._start, self._replayed)
+        episodes, ours = self.episodes, (self._total, self._start, self.replayed)
         done = np.stack([episodes.pursuit.goals_reached, episodes.pursuit.held], axis=1)
         begun = (episodes.q, episodes.first_goals, episodes.steps)
         parts = (*begun, *ours, episodes.drive, done)
@@ -106,11 +95,6 @@ class TrainingArms:
         rates = observations[:, self.simulator.world.layout.places["resolved_rate"]]
         return rates, np.abs(rates).max(axis=1, keepdims=True)
 
-    def replaying(self) -> NDArray[np.bool_]:
-        """Which arms have the noise of replays, shape (n_envs,)."""
-        steps = self.config.replay_noise_steps
-        return self._replayed if steps is None else self._replayed & (self.episodes.steps < steps)
-
     def step(self, actions: Numbers) -> tuple[Numbers, NDArray[np.bool_]]:
         """Move arms by actions, shape (n_envs, n_actions); renew ended episodes.
 
@@ -127,7 +111,7 @@ class TrainingArms:
         self.cut_short.append(np.flatnonzero(result.truncated & ~result.terminated))
         self.finals.append(self._normalized(episodes.observation[self.cut_short[-1]]))
         if ended.any():
-            counted = ended & ~self._replayed
+            counted = ended & ~self.replayed
             self.returns.append(self._total[counted])
             self.successes.append(result.success[counted])
             self._renew(ended.nonzero()[0], ended & ~result.success)
@@ -144,7 +128,7 @@ class TrainingArms:
         def draw(places: NDArray[np.int64]) -> StartsAndGoals:
             return self.sample(self._rng, len(places), self._start_spread)
 
-        scenarios, self._replayed[rows] = self.failed.mixed(
+        scenarios, self.replayed[rows] = self.failed.mixed(
             config.replay_share, self._rng, len(rows), draw
         )
         self._start[rows], episodes.goal[rows] = scenarios
@@ -190,7 +174,7 @@ def collect(
         rates, extent = arms.rates(arms.episodes.observation)
         noise = rng.standard_normal(actions[step].shape).astype(np.float32)
         outcome = actions[step], scales[step], densities[step]
-        choose(networks.means(seen), log_std, noise, arms.replaying(), least, *outcome)
+        choose(networks.means(seen), log_std, noise, arms.replayed, least, *outcome)
         rewards[step], ended = arms.step(np.clip(rates + extent * actions[step], -1.0, 1.0))
         going_on[step] = ~ended
     steps = np.repeat(np.arange(config.n_steps), [len(rows) for rows in arms.cut_short])

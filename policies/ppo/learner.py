@@ -1,14 +1,12 @@
 """Proximal Policy Optimization, one iteration at a time (Schulman et al. 2017)."""
 
 import time
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from kinarm._console import doing
 from kinarm._parallel import available_threads
 from kinarm.errors import InvalidInputError, needed, whole_number
 from kinarm.failed_scenarios import FailedScenarios
@@ -18,17 +16,11 @@ from kinarm.policies.normalizer import Normalizer
 from kinarm.policies.ppo import EpisodeStates, PPOConfig, PPOState
 from kinarm.policies.ppo.arms import TrainingArms, collect
 from kinarm.policies.ppo.networks import ActorCritic, initial_parameters, split_parameters
-from kinarm.policies.ppo.update import imitate, logged, update
+from kinarm.policies.ppo.update import logged, update
 from kinarm.randomness import Stream, stream_generator
-
-IMITATING = "learning from the oracle's motions first"
-"""Told before a training that begins with demonstrations."""
 
 NORMALIZED_OVER = 10_000
 """Random starts whose observations the normaliser describes."""
-
-LEAST_EXTENT, LARGEST_OUTPUT = 0.05, 2.0
-"""Of what a residual network imitates: beyond them, it would learn the last steps alone."""
 
 RANDOM_STEPS = 8
 """Random steps before observations that tell of earlier ones."""
@@ -78,7 +70,7 @@ class PPOTraining:
             actor = split_parameters(parameters, self._widths).actor
             for layer, (weights, bias) in zip(policy.layers, actor, strict=True):
                 weights[:], bias[:] = layer
-        state = PPOState(
+        return PPOState(
             parameters=parameters,
             first_moment=np.zeros_like(parameters),
             second_moment=np.zeros_like(parameters),
@@ -86,10 +78,6 @@ class PPOTraining:
             episodes=EpisodeStates.begun(starts, goals),
             failed=FailedScenarios.none(starts.shape[1], goals.shape[1]),
         )
-        if not config.demonstrations:
-            return state
-        with doing(IMITATING):
-            return replace(state, parameters=self._taught(state))
 
     def _seen(self, rng: np.random.Generator) -> NDArray[np.float64]:
         """Observations of random starts; if they tell of earlier steps, after some at random."""
@@ -100,22 +88,6 @@ class PPOTraining:
         for _ in range(RANDOM_STEPS):
             simulator.step(episodes, rng.uniform(-1, 1, (NORMALIZED_OVER, simulator.n_actions)))
         return episodes.observation
-
-    def _taught(self, state: PPOState) -> NDArray[np.float32]:
-        """Parameters of an actor that has imitated the oracle."""
-        from kinarm.policies.oracle import Oracle
-
-        config, arms, networks = self.config, self.arms, self.networks
-        rng = stream_generator(Stream.PPO_DEMONSTRATIONS, config.seed)
-        scenarios = arms.sample(rng, config.demonstrations)
-        oracle = Oracle(arms.simulator.problem, threads=self.threads)
-        shown = oracle.demonstrate(*scenarios)
-        rates, extent = arms.rates(shown.observations)
-        wanted = (shown.actions - rates) / np.maximum(extent, LEAST_EXTENT)
-        wanted = np.clip(wanted, -LARGEST_OUTPUT, LARGEST_OUTPUT)
-        networks.load(state.parameters)
-        imitate(networks, (shown.observations, wanted), state.normalizer, rng, self.threads)
-        return networks.gathered(networks.weights)
 
     def iterate(self, state: PPOState) -> PPOState:
         """One rollout and one update."""

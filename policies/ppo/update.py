@@ -1,8 +1,4 @@
-"""Updates of actor and critic by Adam, and imitation of the oracle.
-
-An actor may imitate the oracle first, since reinforcement spends most steps on finding the goals at
-all. Imitation alone reaches far fewer goals: it never sees where its own errors lead.
-"""
+"""Updates of actor and critic by Adam."""
 
 import itertools
 from typing import Any, NamedTuple
@@ -13,7 +9,6 @@ from numpy.typing import NDArray
 from kinarm._parallel import SHARED_STEPS, run_together
 from kinarm.policies.config import scheduled
 from kinarm.policies.learners import CurvePoint
-from kinarm.policies.normalizer import Normalizer, input_scale
 from kinarm.policies.ppo import PPOConfig
 from kinarm.policies.ppo.kernels.layers import Numbers
 from kinarm.policies.ppo.kernels.update import (
@@ -145,54 +140,3 @@ def _find_gradients(threads: int, *given: Any) -> None:
         return 0
 
     run_together(work, SHARED_STEPS, min(threads, PARTS), lambda _: None)
-
-
-EPOCHS = 30
-"""How often imitation uses each step."""
-
-BATCH_SIZE = 512
-"""Steps per gradient step."""
-
-LEARNING_RATE = 1e-3
-"""Initial step size of Adam; it falls linearly to zero."""
-
-
-def imitate(
-    networks: ActorCritic,
-    shown: tuple[NDArray[np.float64], NDArray[np.float64]],
-    normalizer: Normalizer,
-    rng: np.random.Generator,
-    threads: int,
-) -> None:
-    """Change the actor so that its means come close to the actions shown.
-
-    Parameters
-    ----------
-    networks : ActorCritic
-        Networks, whose actor is changed.
-    shown : tuple of ndarray, shapes (n, n_observations) and (n, n_actions)
-        Observations, and the actions that are imitated.
-    normalizer : Normalizer
-        Statistics that normalise observations.
-    rng : numpy.random.Generator
-        Draws minibatches.
-    threads : int
-        Threads to use; the result does not depend on them.
-    """
-    observations, actions = shown
-    seen = (observations - normalizer.mean) * input_scale(normalizer.std)
-    n_actions, arrays32 = actions.shape[1], (seen.astype(np.float32), actions.astype(np.float32))
-    experience = Experience(*arrays32, *np.empty((4, 0), dtype=np.float32))
-    nets = (networks.actor, networks.critic)
-    gradients = np.empty((PARTS, len(networks.weights)), dtype=np.float32)
-    moments = np.zeros_like(networks.weights), np.zeros_like(networks.weights)
-    losses = np.empty((PARTS, LOSSES))
-    batches = max(1, len(seen) // BATCH_SIZE)
-    for epoch in range(EPOCHS):
-        for number, chosen in enumerate(np.array_split(rng.permutation(len(seen)), batches)):
-            objective = Objective(0.0, 0.0, 0.0, 1.0 / (len(chosen) * n_actions), imitating=True)
-            arrays = (experience, chosen, objective, (0.0, 1.0), gradients, losses)
-            _find_gradients(threads, *nets, *arrays)
-            done = (epoch * batches + number) / (EPOCHS * batches)
-            descent = Descent(LEARNING_RATE * (1 - done), 0.9, 0.999, 1e-8, 1e9)
-            descend(*nets, *moments, gradients, descent, epoch * batches + number + 1)

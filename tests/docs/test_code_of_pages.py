@@ -36,7 +36,7 @@ EXCEPTIONS = {
     r"kinarm-bench": "measures for minutes; tests/commands/test_bench_command.py",
     r"kinarm-reproduce|.*ReproductionRequest": "trains for half an hour; tests/commands",
     r"kinarm-study .*--(ray|slurm)": "needs a cluster; tests/evaluation/experiments",
-    r"kinarm-study (learners|teacher|ars_factors|search)": "trains for hours; tests/frozen",
+    r"kinarm-study (learners|ars_factors|search)": "trains for hours; tests/frozen",
     r"kinarm-train .*search/best": "needs what that search found",
     r"kinarm-eval .*model\.zip": "needs such a model; tests/docs/test_policies.py",
     r"kinarm-study curves .*logs": "needs such logs; tests/evaluation",
@@ -47,10 +47,7 @@ EXCEPTIONS = {
 
 SHORTER = {
     r"kinarm-train ppo .*--recipe best .*--seeds": (
-        "--iterations 1 --n-envs 8 --batch-size 64 --demonstrations 8 --seeds 1"
-    ),
-    r"kinarm-train ppo .*--recipe (taught|best|precise)": (
-        "--iterations 1 --n-envs 8 --batch-size 64 --demonstrations 8"
+        "--iterations 1 --n-envs 8 --batch-size 64 --seeds 1"
     ),
     r"kinarm-train ppo": "--iterations 1 --n-envs 8 --batch-size 64",
     r"kinarm-train ars .*--seeds": "--iterations 2 --jobs 1",

@@ -41,7 +41,7 @@ def test_every_shipped_policy_and_submission_has_rows(recorded):
 def test_the_best_are_measured_again(recorded):
     assert recorded["best"] == {problem: best_policy(problem) for problem in PROBLEMS}
     for problem, name in recorded["best"].items():
-        assert re.match(r"ppo-(best|precise)-both-seed\d", name)
+        assert re.match(r"ppo-best-both-seed\d", name)
         again = evaluate(name, problem, leaderboard.TRIALS, leaderboard.SEED, oracle=True)
         (row,) = (
             row

@@ -142,7 +142,7 @@ def ppo_digests() -> dict[str, str]:
         ("tuned", "left", {}),
         ("tuned", "both", {}),
         ("tuned", "right", again),
-        ("taught", "both", {"demonstrations": 60}),
+        ("best", "both", {}),
     ):
         states: list[PPOState] = []
         made = recipe("ppo", name, problem=PROBLEMS[task], seed=2)

@@ -103,7 +103,7 @@ class TestEvaluation:
 
     def test_a_policy_keeps_to_its_kind_of_goals(self, policy):
         seen = ["joint_angles", "goal_rotation"]
-        turned = ReachProblem.load("both").replace(goal={"kind": "pose"}, observation=seen)
+        turned = ReachProblem.load("both").replace(goal={"kind": "direction"}, observation=seen)
         made = replace(policy.provenance, problem=turned)
         with pytest.raises(Exception, match="cannot have 'goal_rotation'"):
             evaluate(replace(policy, provenance=made), "both", trials=4)

@@ -128,8 +128,8 @@ class TestFile:
             ("speed = 3", "mine.toml: unknown key 'speed' .did you mean 'seed'"),
             ("[reward]\nbonus = 1", "mine.toml: unknown key 'reward.bonus'; available: progress"),
             (
-                'base = "precise"',
-                "mine.toml: base must be one of paper, tuned, linear, best, v1, brs, got 'precise'",
+                'base = "taught"',
+                "mine.toml: base must be one of paper, tuned, linear, best, v1, brs, got 'taught'",
             ),
             ("noise =", "mine.toml: not a recipe file: "),
         ],

@@ -65,8 +65,8 @@ def test_another_arm_will_do():
 def test_others_are_refused(tmp_path, network_file):
     with pytest.raises(UnknownNameError, match="nothing-like-it"):
         first_policy(ARSConfig(initial_policy="nothing-like-it"))
-    adding = replace(load_policy("ppo-quick-both-seed0"), shield=False)
-    settings = {"initial_policy": "ppo-quick-both-seed0", "net_arch": (64, 64, 64)}
+    adding = load_policy("ppo-best-both-seed0")
+    settings = {"initial_policy": "ppo-best-both-seed0", "net_arch": (64, 64, 64)}
     with pytest.raises(InvalidInputError, match="is residual, the training is not residual"):
         first_policy(PPOConfig(problem=adding.problem, **settings))
     same_deeds(first_policy(PPOConfig(problem="left", residual=True, **settings)), adding)

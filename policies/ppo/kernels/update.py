@@ -47,17 +47,12 @@ class Experience(NamedTuple):
 
 
 class Objective(NamedTuple):
-    """Weights of the loss (see `PPOConfig`), and of a sample in its means.
-
-    The loss of imitation is the squared error of the means of actions; it needs nothing else of the
-    experience.
-    """
+    """Weights of the loss (see `PPOConfig`), and of a sample in its means."""
 
     clip_range: float
     ent_coef: float
     vf_coef: float
     share: float
-    imitating: bool = False
 
 
 class Descent(NamedTuple):
@@ -177,12 +172,6 @@ def add_gradients(
             # Replace means of actions by derivatives of the clipped surrogate.
             for s in range(samples):
                 i, row = rows[s], mean_sink + s * padded(n_actions)
-                if objective.imitating:
-                    for j in range(n_actions):
-                        error = float(work[row + j]) - experience.actions[i, j]
-                        loss[0] += error * error
-                        work[row + j] = 2.0 * objective.share * error
-                    continue
                 density, scale = 0.0, float(experience.scales[i])
                 for j in range(n_actions):
                     deviation = (float(experience.actions[i, j]) - work[row + j]) / scale
@@ -202,8 +191,6 @@ def add_gradients(
                     work[row + j] = slope * pull / scale
                     gradient[by_log_std + j] += slope * (deviation * pull - 1.0)
             backward(actor, tiled, samples, work, behind, gradient)
-            if objective.imitating:
-                continue
             forward(critic, tiled, work)
             # Replace values by derivatives of the squared error.
             for s in range(samples):

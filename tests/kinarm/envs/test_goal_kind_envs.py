@@ -63,7 +63,7 @@ def test_a_batch_is_like_single_arms():
     np.testing.assert_array_equal(seen[1], one)
     rng = np.random.default_rng(0)
     for _ in range(12):
-        actions = rng.uniform(-1, 1, (3, 5))
+        actions = rng.uniform(-1, 1, (3, 6))
         seen, _, terminated, truncated, infos = envs.step(actions)
         one, *_, info = single.step(actions[1])
         np.testing.assert_array_equal(seen[1], one)
@@ -98,7 +98,11 @@ def test_the_mirror_reflects_goals(kind):
 def test_recordings_and_pages_show_them(goal, tmp_path):
     simulator = Simulator(ReachProblem.load("right").replace(goal=goal), threads=1)
     starts, goals = simulator.sample(np.random.default_rng(0), 2)
-    rollouts = simulator.rollout(lambda seen: np.zeros((len(seen), 5)), starts, goals, record=True)
+
+    def still(seen):
+        return np.zeros((len(seen), simulator.n_actions))
+
+    rollouts = simulator.rollout(still, starts, goals, record=True)
     recordings = record_rollouts(simulator, rollouts, "still")
     save_recordings(tmp_path / "two.npz", recordings)
     for made, read in zip(recordings, load_recordings(tmp_path / "two.npz"), strict=True):

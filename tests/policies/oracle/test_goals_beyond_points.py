@@ -251,4 +251,4 @@ class TestGoalsThatMove:
         episodes = simulator.reset(starts, goals)
         for step in range(20):
             np.testing.assert_allclose(episodes.goal, stage.targets[:, step], rtol=0, atol=0)
-            simulator.step(episodes, np.zeros((5, 5)))
+            simulator.step(episodes, np.zeros((5, 6)))

@@ -172,20 +172,6 @@ class TestMirror:
         np.testing.assert_array_equal(first[1][right], second[1][right])
 
 
-def test_tolerance_can_change_between_restored_states(begun):
-    """All else goes on; episodes end as in arms that were made with it."""
-    arms, state = begun(tolerance=0.05)
-    built, rng = made(tolerance=0.7), np.random.default_rng(9)
-    arms.config = built.config
-    for each in (arms, built):
-        each.restore(state, np.random.default_rng(10))
-    for _ in range(80):
-        actions = rng.uniform(-1, 1, (NUMBER, 5))
-        for a, b in zip(arms.step(actions), built.step(actions), strict=True):
-            np.testing.assert_array_equal(a, b)
-    assert np.concatenate(arms.successes).any()
-
-
 class TestReplay:
     """Episodes that begin where earlier ones failed."""
 
@@ -256,14 +242,6 @@ def test_steps_that_a_shield_replaces_have_a_price(begun):
         np.testing.assert_allclose((cheap - paid)[~ended], 0.5 * more, rtol=0, atol=1e-6)
         replaced += more.sum()
     assert replaced > 0
-
-
-def test_tolerances_of_rotations_fall_with_those_of_positions():
-    arms = made(goal={"kind": "pose", "rotation_tolerance": 0.05}, tolerance=0.005)
-    arms.reach_within(0.05)
-    assert arms.simulator.task.goal.rotation_tolerance == pytest.approx(0.5)
-    assert arms.simulator.world.rules.goal.tolerance == pytest.approx(0.5)
-    assert arms.simulator.world.rules.tolerance == 0.05
 
 
 def drive(arms, steps=200):

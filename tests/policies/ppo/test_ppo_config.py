@@ -21,7 +21,6 @@ from kinarm.task import RewardWeights
         ({"training_tolerance": 0}, "training_tolerance must be greater than 0, got 0"),
         ({"ent_coef": -1}, "ent_coef must not be negative, got -1"),
         ({"replay_log_std": -1.0}, "replay_log_std needs a replay_share above 0"),
-        ({"replay_noise_steps": 5}, "replay_noise_steps needs a replay_log_std"),
         ({"learning_rate_schedule": "cosine"}, "constant, linear, got 'cosine'"),
     ],
 )
@@ -50,21 +49,6 @@ def test_noise_is_learnt_or_falls_to_the_end():
     )
 
 
-def test_tolerance_falls_geometrically():
-    config = PPOConfig(training_tolerance=0.005, initial_tolerance=0.08)
-    expected = [0.08, 0.02, 0.005, 0.005]
-    assert [config.tolerance_at(done) for done in (0, 0.45, 0.9, 1)] == pytest.approx(expected)
-    late = replace(config, widening=0.5)
-    assert [late.tolerance_at(done) for done in (0, 0.5, 0.7, 0.9)] == pytest.approx(
-        expected[:1] + expected[:3]
-    )
-    assert replace(config, widening=1.0).tolerance_at(0.8) == 0.08
-    plain = [
-        PPOConfig(**settings).tolerance_at(0.3) for settings in ({}, {"training_tolerance": 0.03})
-    ]
-    assert plain == [0.05, 0.03]
-
-
 def test_starts_widen_to_the_spread_of_the_task():
     problem = PROBLEMS["right"].replace(start_spread=0.5)
     config = PPOConfig(problem=problem, initial_start_spread=0.2, widening=0.5)
@@ -80,7 +64,6 @@ def test_starts_widen_to_the_spread_of_the_task():
         {"initial_penalty": 0.5},
         {"widening": 0.3, "initial_gamma": 0.9},
         {"final_log_std": -2.0},
-        {"initial_tolerance": 0.2},
     ],
 )
 def test_a_longer_training_begins_alike_only_where_nothing_changes_in_its_course(changes):

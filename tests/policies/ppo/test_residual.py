@@ -92,7 +92,7 @@ def test_learners_show_the_rates_and_add_to_them():
 
 def test_goals_are_met_closely_before_anything_is_learnt():
     """Half of all goals within a millimetre: what a network has to learn is the way around."""
-    config = recipe("ppo", "quick", problem="both", iterations=1, demonstrations=0)
+    config = recipe("ppo", "best", problem="both", iterations=1)
     state = next(iter(training_states(config, None)))
     policy = state_policy(config, state)
     simulator = Simulator(PROBLEM, threads=1).with_tolerance(0.001).shielded()
