@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import replace
+from itertools import compress
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +15,12 @@ from kinarm.problem import PROBLEMS, ReachProblem
 
 PER_TRAINING = ("problem", "seed")
 """Settings that vary between trainings with a recipe."""
+
+CONDITIONS = ("where_regions_differ", "where_goals_are_noisy")
+"""Under which a recipe may have other settings.
+
+Several regions are to be reached that no reflection joins; goals are not seen where they are.
+"""
 
 RECIPE_REACH = 1.264
 """Reach of the arm ``paper``, for which recipes were found [m]."""
@@ -92,7 +99,7 @@ def shipped_learner(name: str, config: type[ConfigT], **parts: Any) -> Learner[C
     """A learner of kinarm, with the recipes of its file in ``data/recipes``.
 
     A recipe has a ``summary``, settings that replace those of its ``base``, and
-    maybe others ``where_regions_differ``; see `_adapted`.
+    maybe others under `CONDITIONS`; see `_adapted`.
 
     Parameters
     ----------
@@ -101,30 +108,31 @@ def shipped_learner(name: str, config: type[ConfigT], **parts: Any) -> Learner[C
     **parts
         Other fields of `Learner`.
     """
-    path, summaries, recipes, apart = shipped_files("recipes")[name], {}, {}, {}
+    path, summaries, recipes, special = shipped_files("recipes")[name], {}, {}, {}
     tables = read_toml(path, "recipe")
     for recipe_name, table in tables.items():
         summaries[recipe_name] = table.pop("summary")
-        differing = table.pop("where_regions_differ", {})
+        changes = {each: table.pop(each) for each in CONDITIONS if each in table}
         table |= {**tables.get(table.pop("base", ""), {}), **table, "recipe": recipe_name}
         recipes[recipe_name] = from_plain(config, table, str(path))
-        apart[recipe_name] = from_plain(config, {**table, **differing}, str(path))
+        for condition, changed in changes.items():
+            made = from_plain(config, {**table, **changed}, str(path))
+            special[recipe_name, condition] = {each: getattr(made, each) for each in changed}
     return Learner(
         name=name,
         config=config,
         recipes=recipes,
         summaries=summaries,
-        adapt=lambda made: _adapted(made, apart),
+        adapt=lambda made: _adapted(made, special),
         **parts,
     )
 
 
-def _adapted(config: ConfigT, apart: Mapping[str, ConfigT]) -> ConfigT:
+def _adapted(config: ConfigT, special: Mapping[tuple[str, str], Mapping[str, Any]]) -> ConfigT:
     """Adapt a recipe to its problem, if it is symmetric.
 
     Progress is rewarded in proportion to the arm's reach, and training tolerances are shares of the
-    task's. A recipe of ``apart`` replaces it where several regions are to be reached that no
-    reflection joins.
+    task's. Settings of ``special`` replace others under a condition.
     """
     if not getattr(config, "symmetric", False):
         return config
@@ -132,8 +140,9 @@ def _adapted(config: ConfigT, apart: Mapping[str, ConfigT]) -> ConfigT:
 
     problem, changes = config.problem, dict[str, Any]()
     changes["symmetric"] = symmetric = not missing_mirror(problem)
-    if different_regions(problem, symmetric) > 1:
-        config = replace(apart[config.recipe], problem=problem, seed=config.seed)
+    held = (different_regions(problem, symmetric) > 1, problem.plant.range_of("goal_noise")[1] > 0)
+    for condition in compress(CONDITIONS, held):
+        config = replace(config, **special.get((config.recipe, condition), {}))
     scale = problem.task.tolerance / PROBLEMS["right"].task.tolerance
     if (length := getattr(config, "training_tolerance", None)) is not None:
         changes["training_tolerance"] = round(scale * length, 9)

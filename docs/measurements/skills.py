@@ -1,0 +1,95 @@
+"""What one recipe learns: ``python -m docs.measurements.skills FOLDER`` judges its trainings.
+
+FOLDER is that of ``kinarm-study skills --out FOLDER``. Its policies face trials that nothing else
+draws, bare and behind a shield; ``data/results/skills/skills.json`` keeps what they reach, and
+`docs.tables` makes a table of it. Problems that it has with as many trainings are not judged again.
+"""
+
+import argparse
+import json
+import tempfile
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from docs.leaderboard import rows_of
+from kinarm import Simulator
+from kinarm._files import write_text
+from kinarm.evaluation import EvaluationRequest, Study
+from kinarm.evaluation.contestants import ORACLE
+from kinarm.evaluation.trials import TrialSet
+from kinarm.policies import Policy
+
+RECORD = Path(__file__).parents[2] / "data" / "results" / "skills" / "skills.json"
+
+TRIALS, SEED = 10_000, 3602
+"""Trials of each problem: nothing else draws from this seed."""
+
+BOUNDED, TIMED = 1000, 1000
+"""Trials that the oracle is asked about, and of which the speed at the goal is taken."""
+
+
+def judged(policies: Mapping[str, Policy]) -> list[dict[str, Any]]:
+    """Rows of policies of one problem by file name: bare, and behind a shield."""
+    with tempfile.TemporaryDirectory() as folder:
+        paths = [Path(folder) / name for name in policies]
+        for path, policy in zip(paths, policies.values(), strict=True):
+            policy.save(path)
+        asked: dict[str, Any] = {"policies": tuple(map(str, paths)), "seed": SEED}
+        rows = rows_of(
+            EvaluationRequest(**asked, trials=TRIALS, shield=True, oracle=False).evaluate()
+        )
+        (oracle,) = (
+            each
+            for each in EvaluationRequest(**asked, trials=BOUNDED).evaluate()
+            if each.contestant is ORACLE
+        )
+    for row in rows:
+        del row["failures"]
+        row["oracle"] = float(oracle.rollouts.success.mean())
+        row["speed"] = speed_at_goal([*policies.values()])
+    return rows
+
+
+def speed_at_goal(policies: list[Policy]) -> float:
+    """Median speed of the tool behind a shield in the last step of trials that succeed [m/s]."""
+    simulator = Simulator(policies[0].problem, threads=1).shielded()
+    trials, lengths = TrialSet.draw(simulator, TIMED, SEED), []
+    for policy in policies:
+        rollouts = simulator.rollout(policy, trials.starts, trials.goals, record=True)
+        hits = np.flatnonzero(rollouts.success)
+        last = [rollouts.paths[hits, rollouts.steps[hits] - back] for back in (0, 1)]
+        end, before = (simulator.world.poses(each)[:, :3, 3] for each in last)
+        lengths.append(np.linalg.norm(end - before, axis=1))
+    seconds = simulator.problem.stepping.time_step
+    return round(float(np.median(np.concatenate(lengths))) / seconds, 3)
+
+
+def main() -> None:
+    """Judge what the record lacks."""
+    parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
+    parser.add_argument("folder", type=Path, help="folder of the study")
+    study = Study.load(parser.parse_args().folder)
+    rows: list[dict[str, Any]] = []
+    if RECORD.exists():
+        rows = json.loads(RECORD.read_text(encoding="utf-8"))["rows"]
+    for group in study.groups():
+        name = group.config.problem.name
+        known = [row for row in rows if row["problem"] == name]
+        if known and len(known[0]["seeds"]) == len(group.runs):
+            continue
+        runs = [run for run in study.finished if run.config.problem.name == name]
+        policies = {f"ppo-best-{name}-seed{run.config.seed}.npz": study.policy(run) for run in runs}
+        found = judged(policies)
+        spent = [each.clock.processor_seconds or np.nan for each in group.runs]
+        for row in found:
+            row["minutes"] = round(float(np.median(spent)) / 60, 2)
+        rows = [*(row for row in rows if row["problem"] != name), *found]
+        record = {"trials": TRIALS, "seed": SEED, "bounded": BOUNDED, "rows": rows}
+        write_text(RECORD, json.dumps(record, indent=1) + "\n")
+
+
+if __name__ == "__main__":
+    main()
