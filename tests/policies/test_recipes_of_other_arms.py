@@ -113,3 +113,11 @@ def test_regions_that_are_images_of_each_other_count_once():
     shorter = replace(left, upper=(left.upper[0] - 0.1, *left.upper[1:]))
     unlike = PROBLEMS["both"].replace(scene=replace(scene, goal_regions=(right, shorter)))
     assert recipe("ars", "tuned", problem=unlike).net_arch == (16,)
+
+
+def test_where_goals_are_not_seen_where_they_are():
+    noisy = recipe("ppo", "best", problem=PROBLEMS["both"].replace(goal_noise=(0.0, 0.01)))
+    assert (noisy.training_tolerance, noisy.training_hold) == (0.03, 1)
+    assert noisy.reward.collision == -6.0
+    blurred = recipe("ppo", "best", problem=PROBLEMS["both"].replace(noise=0.01))
+    assert blurred == replace(recipe("ppo", "best", problem="both"), problem=blurred.problem)
