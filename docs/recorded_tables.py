@@ -232,7 +232,32 @@ def failures() -> tuple[list[str], dict[str, dict[str, float]]]:
     return [cause for cause, _ in total.most_common()], shares
 
 
+def skills_table() -> str:
+    """What PPO's recipe best reaches of each problem, bare and behind a shield."""
+    record = json.loads((RESULTS / "skills" / "skills.json").read_text(encoding="utf-8"))
+    faced: dict[str, list[Mapping[str, Any]]] = {}
+    for row in record["rows"]:
+        faced.setdefault(row["problem"], []).append(row)
+    rows = []
+    for problem, (bare, behind) in faced.items():
+        shown = []
+        for row in (bare, behind):
+            success, *interval = (f"{100 * each:.1f}" for each in row["success"])
+            worst = min(share for share, _ in row["seeds"].values())
+            spread = f" ({'..'.join(interval)})" if interval else ""
+            shown += [f"{success}{spread}", f"{100 * worst:.1f}", f"{100 * row['collision']:.2f}"]
+        ratio = "" if behind["step_ratio"] is None else f"{behind['step_ratio']:.2f}"
+        oracle = f"{100 * behind['oracle']:.1f}"
+        end = [oracle, ratio, f"{behind['speed']:.2f}", f"{behind['minutes']:.1f}"]
+        rows.append([f"`{problem}`", str(len(bare["seeds"])), *shown, *end])
+    three = ["worst seed %", "contact %"]
+    heads = ["problem", "seeds", "bare: success %", *three, "behind a shield: success %", *three]
+    heads += ["oracle %", "step ratio", "speed at the goal m/s", "minutes of a core"]
+    return markdown_table(heads, rows)
+
+
 RECORDED = {
+    "skills": skills_table,
     "leaderboard": leaderboard_table,
     "failures": failures_table,
     "failures-to-watch": watching_table,

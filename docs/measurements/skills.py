@@ -27,8 +27,8 @@ RECORD = Path(__file__).parents[2] / "data" / "results" / "skills" / "skills.jso
 TRIALS, SEED = 10_000, 3602
 """Trials of each problem: nothing else draws from this seed."""
 
-BOUNDED, TIMED = 1000, 1000
-"""Trials that the oracle is asked about, and of which the speed at the goal is taken."""
+TIMED = 1000
+"""Trials of which the speed at the goal is taken."""
 
 
 def judged(policies: Mapping[str, Policy]) -> list[dict[str, Any]]:
@@ -37,15 +37,12 @@ def judged(policies: Mapping[str, Policy]) -> list[dict[str, Any]]:
         paths = [Path(folder) / name for name in policies]
         for path, policy in zip(paths, policies.values(), strict=True):
             policy.save(path)
-        asked: dict[str, Any] = {"policies": tuple(map(str, paths)), "seed": SEED}
-        rows = rows_of(
-            EvaluationRequest(**asked, trials=TRIALS, shield=True, oracle=False).evaluate()
+        request = EvaluationRequest(
+            policies=tuple(map(str, paths)), trials=TRIALS, seed=SEED, shield=True
         )
-        (oracle,) = (
-            each
-            for each in EvaluationRequest(**asked, trials=BOUNDED).evaluate()
-            if each.contestant is ORACLE
-        )
+        faced = request.evaluate()
+    (oracle,) = (each for each in faced if each.contestant is ORACLE)
+    rows = rows_of([each for each in faced if each is not oracle])
     for row in rows:
         del row["failures"]
         row["oracle"] = float(oracle.rollouts.success.mean())
@@ -87,7 +84,7 @@ def main() -> None:
         for row in found:
             row["minutes"] = round(float(np.median(spent)) / 60, 2)
         rows = [*(row for row in rows if row["problem"] != name), *found]
-        record = {"trials": TRIALS, "seed": SEED, "bounded": BOUNDED, "rows": rows}
+        record = {"trials": TRIALS, "seed": SEED, "rows": rows}
         write_text(RECORD, json.dumps(record, indent=1) + "\n")
 
 
