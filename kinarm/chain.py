@@ -146,9 +146,7 @@ class MotionBounds(NamedTuple):
                 for i in range(n)
             ]
         )
-        lengths = link_lengths(chain)
-        outward = np.append(np.cumsum(lengths[::-1])[::-1][1:], 0.0) + length_of(chain.tool)
-        return cls(curvature, swing, outward[:n].copy())
+        return cls(curvature, swing, lengths_to_tool(chain)[:n])
 
 
 def length_of(vector: NDArray[np.float64]) -> float:
@@ -160,6 +158,28 @@ def link_lengths(chain: Chain) -> NDArray[np.float64]:
     """Bound on the distance of each joint's origin from the one before [m], shape (n,)."""
     slide = np.where(chain.prismatic, np.fmax(np.abs(chain.lower), np.abs(chain.upper)), 0.0)
     lengths: NDArray[np.float64] = np.linalg.norm(chain.translation, axis=1) + slide
+    return lengths
+
+
+def lengths_to_tool(chain: Chain) -> NDArray[np.float64]:
+    """Bound on the distance from each joint's origin to the tool point [m], shape (n,).
+
+    A sum of links, two of which count as one if the joint between them turns: then their ends are
+    farthest apart where they lie on opposite sides of its axis.
+    """
+    n, points = chain.n_joints, np.append(chain.translation, chain.tool[None], axis=0)
+    links, slides = np.append(link_lengths(chain), length_of(chain.tool)), chain.prismatic
+    found = np.append(np.full(n, np.inf), 0.0)
+    for k in reversed(range(n)):
+        found[k] = links[k + 1] + found[k + 1]
+        if k + 2 <= n and not slides[k + 1 : k + 3].any():
+            turned = pin.Quaternion(*chain.rotation[k + 1]).matrix() * points[k + 1][:, None]
+            ends = np.array([-turned.sum(axis=0), points[k + 2]])
+            along = (ends * chain.axis[k + 1]).sum(axis=1)
+            aside = np.sqrt(np.square(np.cross(chain.axis[k + 1], ends)).sum(axis=1))
+            both = length_of(np.array([along[1] - along[0], aside.sum()]))
+            found[k] = min(found[k], both + found[k + 2])
+    lengths: NDArray[np.float64] = found[:n]
     return lengths
 
 

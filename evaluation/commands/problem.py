@@ -62,7 +62,7 @@ class CheckRequest(ShowRequest):
     seed : int
         Seed of the trials.
     picture : Path
-        Picture of arm and scene (.png).
+        Picture of arm and scene (.png), which needs the extra render.
     json : Path
         All findings, as JSON.
     overwrite : bool
@@ -91,6 +91,8 @@ class CheckRequest(ShowRequest):
             if path is not None:
                 check_output(path, overwrite=self.overwrite, suffix=suffix)
         say_choices([problem])
+        if self.picture is not None:
+            write_picture(self.picture, problem)
         with working("checking") as say:
             check = check_problem(
                 World(problem),
@@ -100,8 +102,6 @@ class CheckRequest(ShowRequest):
             )
         if self.json is not None:
             write_text(self.json, json.dumps(check.to_json(), indent=1))
-        if self.picture is not None:
-            write_picture(self.picture, problem)
         return check
 
 

@@ -21,20 +21,21 @@ from kinarm.kernels.compiling import Array
 from kinarm.problem import ReachProblem
 from kinarm.scene import Scene
 from kinarm.viewer.camera import stage_scale
-from kinarm.viewer.lighting import SUN, SUN_PLACE
 from kinarm.viewer.meshes import Mesh, capsule, cylinder, tube
 from kinarm.viewer.parts import (
+    CUBE,
     FLASH_RADIUS,
     FLOOR_RADIUS,
-    GRID_RADIUS,
-    GRID_STEP,
     OUTCOME_COLOURS,
+    SUN,
+    SUN_PLACE,
     TRACE_RADIUS,
     TRACE_SIDES,
     TRACES,
     Finish,
     cube_mesh,
     goal_marks,
+    grid_lines,
     obstacle_meshes,
 )
 from kinarm.viewer.visual_shapes import arm_parts
@@ -42,7 +43,6 @@ from kinarm.viewer.visual_shapes import arm_parts
 FLOOR = Finish(0xE9ECEF, roughness=0.95)
 OBSTACLE = Finish(0xB4BCC6, roughness=0.8)
 GOAL_SLAB = Finish(0xCBD2DA, roughness=0.7)
-CUBE = Finish(0x009E73, roughness=0.5)
 HALO = Finish(0x009E73, opacity=0.16, glow=True)
 FLASH = Finish(OUTCOME_COLOURS["collision"], opacity=0.5, glow=True)
 SHAPE = Finish(0x56B4E9, roughness=0.6, opacity=0.34)
@@ -221,7 +221,7 @@ def draw_surroundings(window: Visualizer, scene: Scene) -> None:
     window["sun"]["<object>"].set_property("position", list(SUN_PLACE))
     if scene.ground:
         put(window["floor"], FLOOR, cylinder(0.002, FLOOR_RADIUS, 0.0).moved((0, 0, -0.002)))
-        lines = {"attributes": {"position": _typed_array(_grid_lines().astype(np.float32), 3)}}
+        lines = {"attributes": {"position": _typed_array(grid_lines().astype(np.float32), 3)}}
         material = LineBasicMaterial(color=GRID_COLOUR).lower({})
         del material["uuid"]
         _show(window["grid"], "LineSegments", lines, material, np.eye(4))
@@ -259,15 +259,6 @@ def _draw_obstacles(window: Visualizer, scene: Scene) -> None:
         if slab:
             put(window[f"{number}/top"], GOAL_SLAB, *slab)
         put(window[f"{number}/body"], OBSTACLE, body)
-
-
-def _grid_lines() -> NDArray[np.float64]:
-    """Ends of lines within a circle."""
-    lines = []
-    for across in np.arange(-GRID_RADIUS, GRID_RADIUS + 1e-9, GRID_STEP):
-        half = np.sqrt(max(GRID_RADIUS**2 - across**2, 0))
-        lines += [(across, -half), (across, half), (-half, across), (half, across)]
-    return np.column_stack([np.array(lines), np.full(len(lines), 0.0005)])
 
 
 def aim_camera(window: Visualizer, scale: float = 1.0) -> None:

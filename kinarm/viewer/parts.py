@@ -61,6 +61,11 @@ FINISHES = {
 }
 """Finishes of arms."""
 
+CUBE = Finish(0x009E73, roughness=0.5)
+
+SUN, SUN_PLACE = 0xFFF6E8, (-2.0, -1.0, 3.4)
+"""Colour and place of the light that casts shadows; it shines on the origin [m]."""
+
 PLAIN = FINISHES["graphite"], FINISHES["paint"]
 """Finishes of links by turns, for robots without colours."""
 
@@ -178,3 +183,12 @@ def cube_mesh(scene: Scene) -> Mesh:
     """The cube that marks a goal, about the origin."""
     edge = scene.cube_edge or 0.01
     return box((edge, edge, edge), CUBE_CHAMFER * edge)
+
+
+def grid_lines() -> NDArray[np.float64]:
+    """Ends of the floor's lines, which lie within a circle, shape (2 n, 3) [m]."""
+    lines = []
+    for across in np.arange(-GRID_RADIUS, GRID_RADIUS + 1e-9, GRID_STEP):
+        half = np.sqrt(max(GRID_RADIUS**2 - across**2, 0))
+        lines += [(across, -half), (across, half), (-half, across), (half, across)]
+    return np.column_stack([np.array(lines), np.full(len(lines), 0.0005)])

@@ -1,26 +1,35 @@
-"""Pictures of an arm at work, in software: no display or OpenGL."""
+"""Pictures of an arm at work, without a display.
 
-from collections.abc import Iterable
+Triangles are lit at their corners, about as the replay page's: by a sun, a second light from afar,
+and a bright room.
+"""
+
+import math
+from collections import defaultdict
+from collections.abc import Sequence
+from functools import partial
 from itertools import count
+from typing import Any
 
 import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike, NDArray
 
-from kinarm.arm import Arm
 from kinarm.collision import Contact
 from kinarm.errors import UnknownNameError, finite_array, whole_number
 from kinarm.kernels.compiling import Array
 from kinarm.problem import ProblemLike, ReachProblem
 from kinarm.recording import OUTCOMES
 from kinarm.viewer.camera import Camera, CameraLike, stage_scale
-from kinarm.viewer.kernels.rasterising import Eye, Surfaces, draw_view, transform
-from kinarm.viewer.kernels.shading import BACKGROUND, View, paint_floor, shade
-from kinarm.viewer.lighting import SUN_DEPTH, lit
-from kinarm.viewer.meshes import Mesh, tube
+from kinarm.viewer.canvas import NEAR, Layer, draw
+from kinarm.viewer.meshes import Mesh, capsule, lathe, tube
 from kinarm.viewer.parts import (
+    CUBE,
     FLASH_RADIUS,
+    FLOOR_RADIUS,
     OUTCOME_COLOURS,
+    SUN,
+    SUN_PLACE,
     TRACE_RADIUS,
     TRACE_SIDES,
     TRACES,
@@ -29,31 +38,49 @@ from kinarm.viewer.parts import (
     cube_mesh,
     goal_marks,
     goal_pose,
+    grid_lines,
     obstacle_meshes,
+    to_linear,
+    to_srgb,
 )
 from kinarm.viewer.visual_shapes import arm_parts, link_joints
 
-SAMPLES = np.array([(0.375, 0.125), (0.875, 0.375), (0.125, 0.625), (0.625, 0.875)])
-"""Places in a pixel, no two in a row or column, for edges of any slope."""
+single = partial(np.asarray, dtype=np.float32)
 
-MIDDLE = np.array([(0.5, 0.5)])
+BACKGROUND = (238, 241, 244)
+FLOOR, SHADOW, GRID = (235, 241, 247), (201, 207, 216), (180, 189, 199)
+"""Colours of the floor, of shadows on it, and of its lines."""
 
-GRID_WIDTH = 1 / 600
+GRID_WIDTH = 1 / 450
 """Width of the floor's lines, as a share of the picture's height."""
+
+PIECES = 8
+"""Of each line, since each fades from end to end."""
 
 FADING = (0.2, 3.8)
 """The floor fades between these, plus the camera's distance from the origin [m]."""
 
-SHADOW_DETAIL, SHADOW_SIZES = 2, (256, 2048)
-"""Texels of the shadow map per pixel, and least and most of them."""
-HALO_OPACITY = 0.16
-FLASH_OPACITY, FLASH_SWELL = 0.55, 1.5
-
-# Finishes in the replay page's light; the first is the floor's.
-GROUND = Finish(0xD3D9DF, roughness=0.95)
 BODY = Finish(0x8F9AA8, roughness=0.8)
 SLAB = Finish(0xB3BDC8, roughness=0.7)
-CUBE = Finish(0x009E73, roughness=0.5)
+
+LIGHTS = tuple(
+    (single(place) / math.hypot(*place), single(brightness))
+    for place, brightness in (
+        (SUN_PLACE, 0.62 * channels(SUN)),
+        ((-2.5, 1.8, -2.2), 0.3 * channels(0xDCE8FF)),
+    )
+)
+"""Directions to two lights from afar, and how bright they are."""
+
+ROOM, SLOPE = 0.7, single([[-0.03], [0.0], [0.07]])
+"""How bright the room is on the whole, and how this grows along an axis."""
+
+HALO = (*(255 * channels(CUBE.colour)), 0.16 * 255)
+FLASH = (*(255 * channels(OUTCOME_COLOURS["collision"])), 0.55 * 255)
+FLASH_SWELL = 1.5
+
+Surface = tuple[int, Finish, Mesh]
+"""A frame, and what moves with it."""
 
 CUBE_GLOW, TOUCH_GLOW = 0x0B6B50, 0x8C2F00
 """Light of a reached cube, and of links that touch."""
@@ -62,7 +89,7 @@ CUBE_GLOW, TOUCH_GLOW = 0x0B6B50, 0x8C2F00
 class Renderer:
     """Takes pictures of a problem, its arm and the tool's way.
 
-    Light, colours and camera are those of the replay page.
+    Colours and camera are those of the replay page. Shadows fall on the floor.
 
     Parameters
     ----------
@@ -88,23 +115,28 @@ class Renderer:
         self.problem = ReachProblem.load(problem)
         self.width = whole_number("width", width, 1)
         self.height = whole_number("height", height, 1)
-        arm = self.problem.load_arm()
+        arm, scene = self.problem.load_arm(), self.problem.scene
         self.camera = Camera.checked(camera or Camera.of_replays(self.problem, arm))
-        self._scene = TriangleScene(self.problem, arm)
-        self._projection = self.camera.projection(self.width, self.height)
-        rays = np.linalg.inv(self._projection[:, :3]).T[[2, 0, 1]]
-        position = np.array(self.camera.position)
-        fog = float(np.linalg.norm(position)) + np.array(FADING)
-        self._eye = Eye(position, np.ascontiguousarray(rays), SAMPLES, fog)
-        texels = int(np.clip(SHADOW_DETAIL * max(self.width, self.height), *SHADOW_SIZES))
-        self._materials, self._lights = lit(self._scene.finishes, texels)
-        size = self.height, self.width
-        self._floor = np.full((*size, 2, 3), BACKGROUND, dtype=np.float32)
-        self._floor_nearness = np.zeros((*size, len(SAMPLES)), dtype=np.float32)
-        if self.problem.scene.ground:
-            line_width = max(GRID_WIDTH * self.height, 0.4)
-            floor = self._floor, self._floor_nearness
-            paint_floor(self._eye, self._materials, self._lights, line_width, *floor)
+        self._arm, self._data, self._links = arm, arm.model.createData(), link_joints(arm)
+        self._scale = stage_scale(arm, scene)
+        placed = scene.bodies[: len(scene.obstacles)]
+        self._motions = [body.motion for body in placed if body.motion]
+        frames = count(arm.n_joints + 2)
+        groups: dict[tuple[int, Finish], list[Mesh]] = defaultdict(list)
+        for joint, finish, mesh in arm_parts(arm):
+            groups[joint, finish].append(mesh)
+        self._n_arm = len(groups)
+        for finish, mesh in [(CUBE, cube_mesh(scene)), *goal_marks(self.problem.task.goal)]:
+            groups[arm.n_joints + 1, finish].append(mesh)
+        self._surfaces: list[Surface] = [(*key, _single(meshes)) for key, meshes in groups.items()]
+        for body, meshes in zip(placed, obstacle_meshes(scene), strict=True):
+            frame = next(frames) if body.motion else 0
+            parts = zip((BODY, SLAB), meshes, strict=False)
+            self._surfaces += [(frame, finish, _single([mesh])) for finish, mesh in parts]
+        self._eye = single(self.camera.position)
+        self._has_floor = scene.ground and self._eye[2] > 0
+        self._floor = self._faded(_disc(), FLOOR)._replace(hides=True)
+        self._lines = self._faded(self._grid(), GRID)
 
     def __repr__(self) -> str:
         return f"Renderer({self.problem.name}, {self.width} x {self.height})"
@@ -138,117 +170,59 @@ class Renderer:
         -------
         ndarray of uint8, shape (height, width, 3)
             Red, green and blue.
+
+        Raises
+        ------
+        InvalidInputError
+            If a value cannot be used.
+        MissingExtraError
+            If the extra ``render`` is not installed.
         """
-        n_joints = self._scene.n_joints
+        n_joints = self._arm.n_joints
         configuration = finite_array("configuration", configuration, (n_joints,))
         goal = finite_array("goal", goal, (self.problem.task.goal.width(n_joints),))
         way = finite_array("trace", np.empty((0, 3)) if trace is None else trace, (None, 3))
         if outcome is not None and outcome not in OUTCOMES:
             raise UnknownNameError("outcome", outcome, OUTCOMES)
-        surfaces = self._scene.surfaces(configuration, goal, way, outcome, time)
-        everywhere = np.zeros(len(surfaces.places), dtype=np.int64)
-        transform(surfaces.places, everywhere, self._projection[None], surfaces.corners)
-        nearness = self._floor_nearness.copy()
-        seen = np.full(nearness.shape, -1, dtype=np.int32)
-        draw_view(surfaces.corners, surfaces.faces, SAMPLES, nearness, seen)
-        shadow, shadowed = self._lights.shadow, np.empty_like(surfaces.places)
-        transform(surfaces.places, everywhere, self._lights.sunward[None], shadowed)
-        away = 1.0 / shadowed[:, 2:].clip(1.0, 2 * SUN_DEPTH)  # as of a picture's surfaces
-        corners = np.concatenate([shadowed[:, :2] * away, away], axis=1)
-        shadow.fill(0.0)
-        draw_view(corners, surfaces.faces, MIDDLE, shadow, np.empty(shadow.shape, np.int32))
-        emission = self._scene.emission(outcome, contact.pair if contact else ())
-        view = View(
-            eye=self._eye,
-            surfaces=surfaces,
-            materials=self._materials._replace(emission=emission),
-            lights=self._lights,
-            balls=self._balls(goal, contact),
-            floor=self._floor,
-            nearness=nearness,
-            seen=seen,
-        )
-        picture = np.empty((self.height, self.width, 3), dtype=np.uint8)
-        shade(view, picture)
-        return picture
-
-    def _balls(self, goal: Array, contact: Contact | None) -> Array:
-        """Halo of goals within tolerance, and a flash at a contact."""
-        halo = self.problem.task.tolerance, *channels(CUBE.colour), HALO_OPACITY, 0.0
-        balls = [(*goal[:3], *halo)]
+        surfaces = list(self._surfaces)
+        if len(way) > 1:
+            mesh = tube(way, self._scale * TRACE_RADIUS, TRACE_SIDES)
+            surfaces.append((0, TRACES[outcome], _single([mesh])))
+        poses = single(self._poses(configuration, goal, time))
+        drawn = self._drawn(surfaces, poses, outcome, contact)
+        layers = [drawn, _ball(goal[:3], self.problem.task.tolerance, HALO)]
+        if self._has_floor:
+            shadow = self._faded(_on_floor(drawn.places), SHADOW)
+            layers = [self._floor, shadow, self._lines, *layers]
         if contact is not None:
-            size = self._scene.scale * FLASH_SWELL * FLASH_RADIUS
-            flash = size, *channels(OUTCOME_COLOURS["collision"]), FLASH_OPACITY, 1.0
-            balls.append((*contact.point, *flash))
-        return np.array(balls)
+            size = self._scale * FLASH_SWELL * FLASH_RADIUS
+            layers.append(_ball(contact.point, size, FLASH)._replace(hidden=False))
+        nearest = NEAR * math.dist(self.camera.position, self.camera.target)
+        projection = self.camera.projection(self.width, self.height)
+        return draw(layers, (self.width, self.height), projection, nearest, BACKGROUND)
 
-
-class TriangleScene:
-    """Surfaces of a problem and its arm, placed for each picture.
-
-    Of its finishes by material, the floor's comes first; its scale is the `stage_scale`.
-    """
-
-    def __init__(self, problem: ReachProblem, arm: Arm) -> None:
-        scene = problem.scene
-        self.n_joints, self.scale = arm.n_joints, stage_scale(arm, scene)
-        self._arm, self._data, self._links = arm, arm.model.createData(), link_joints(arm)
-        self._goal = problem.task.goal
-        placed = scene.bodies[: len(scene.obstacles)]
-        self._motions = [body.motion for body in placed if body.motion]
-        frames = count(self.n_joints + 2)
-        standing = [
-            (frame, finish, mesh)
-            for body, meshes in zip(placed, obstacle_meshes(scene), strict=True)
-            for frame in [next(frames) if body.motion else 0]
-            for finish, mesh in zip((BODY, SLAB), meshes, strict=False)
-        ]
-        marks = [(CUBE, cube_mesh(scene)), *goal_marks(self._goal)]
-        parts = [*standing, *arm_parts(arm), *((arm.n_joints + 1, *mark) for mark in marks)]
-        self._arm_owners = {part[:2] for part in arm_parts(arm)}
-        # Each frame has its own materials, so that a link can light up.
-        owners = [(0, GROUND), *((0, finish) for finish in TRACES.values())]
-        self._owners = list(dict.fromkeys([*owners, *(part[:2] for part in parts)]))
-        self.finishes = [finish for _, finish in self._owners]
-        meshes = [Mesh.joined([mesh]) for *_, mesh in parts]
-        sizes = [len(mesh.vertices) for mesh in meshes]
-        self._vertices, self._normals, self._faces = Mesh.joined(meshes).with_normals()
-        self._frames = np.repeat([frame for frame, *_ in parts], sizes)
-        self._materials = np.repeat([self._owners.index(part[:2]) for part in parts], sizes)
-
-    def surfaces(
+    def _drawn(
         self,
-        configuration: Array,
-        goal: Array,
-        trace: Array,
+        surfaces: list[Surface],
+        poses: NDArray[Any],
         outcome: str | None,
-        time: float = 0.0,
-    ) -> Surfaces:
-        """All triangles in the world; see `kinarm.viewer.Renderer.render`."""
-        places, normals = np.empty_like(self._vertices), np.empty_like(self._normals)
-        poses = self._poses(configuration, goal, time)
-        transform(self._vertices, self._frames, poses, places)
-        poses[:, :, 3] = 0.0
-        transform(self._normals, self._frames, poses, normals)
-        faces, materials = self._faces, self._materials
-        if len(trace) > 1:
-            way, aside, stretches = _tube(trace, self.scale * TRACE_RADIUS)
-            material = self._owners.index((0, TRACES[outcome]))
-            faces = np.concatenate([faces, stretches + len(places)])
-            places, normals = np.concatenate([places, way]), np.concatenate([normals, aside])
-            materials = np.concatenate([materials, np.full(len(way), material)])
-        return Surfaces(places, normals, np.empty_like(places), faces, materials)
-
-    def emission(self, outcome: str | None, touching: Iterable[str]) -> Array:
-        """Light of each material, shape (n, 3): of a reached cube and of contact."""
-        joints = {self._links[body] for body in touching if body in self._links}
-        light = np.zeros((len(self._owners), 3))
-        for material, (frame, finish) in enumerate(self._owners):
+        contact: Contact | None,
+    ) -> Layer:
+        """Surfaces in light, with what glows."""
+        touching = {self._links.get(body) for body in contact.pair} if contact else set()
+        corners, colours = [], []
+        for number, (frame, finish, mesh) in enumerate(surfaces):
+            vertices, normals, faces = mesh.with_normals()
+            turn, glow = poses[frame, :, :3].T, 0
             if finish == CUBE and outcome == "success":
-                light[material] = channels(CUBE_GLOW)
-            elif frame in joints and (frame, finish) in self._arm_owners:
-                light[material] = channels(TOUCH_GLOW)
-        return light
+                glow = CUBE_GLOW
+            elif number < self._n_arm and frame in touching:
+                glow = TOUCH_GLOW
+            places = vertices @ turn + poses[frame, :, 3]
+            colour = _lit(finish, places, normals @ turn, self._eye, single(channels(glow)))
+            corners.append(places[faces.ravel()])
+            colours.append(colour[faces.ravel()])
+        return Layer(np.concatenate(corners), np.concatenate(colours))
 
     def _poses(self, configuration: Array, goal: Array, time: float) -> Array:
         """Frames in the world, shape (n_joints + 2 + n_moving, 3, 4).
@@ -256,20 +230,98 @@ class TriangleScene:
         World, joints, goal, and offsets of obstacles that move.
         """
         pin.forwardKinematics(self._arm.model, self._data, configuration)
-        poses = np.zeros((self.n_joints + 2 + len(self._motions), 3, 4))
+        n_joints = self._arm.n_joints
+        poses = np.zeros((n_joints + 2 + len(self._motions), 3, 4))
         poses[:, :, :3] = np.eye(3)
-        for joint in range(1, self.n_joints + 1):
+        for joint in range(1, n_joints + 1):
             poses[joint] = self._data.oMi[joint].homogeneous[:3]
-        poses[self.n_joints + 1] = goal_pose(self._goal, goal)[:3]
-        for pose, motion in zip(poses[self.n_joints + 2 :], self._motions, strict=True):
+        poses[n_joints + 1] = goal_pose(self.problem.task.goal, goal)[:3]
+        for pose, motion in zip(poses[n_joints + 2 :], self._motions, strict=True):
             pose[:, 3] = motion.offsets(np.array([time]))[0]
         return poses
 
+    def _faded(self, places: Array, colour: tuple[int, ...]) -> Layer:
+        """Triangles on the floor, which fades into the background."""
+        near, far = (float(np.linalg.norm(self._eye)) + each for each in FADING)
+        distance = np.linalg.norm(places - self._eye, axis=1)
+        share = np.clip((distance - near) / (far - near), 0, 1)[:, None]
+        share = share**2 * (3 - 2 * share)
+        shown = colour + share * (single(BACKGROUND) - colour)
+        colours = np.insert(shown.astype(np.uint8), 3, 255, axis=1)
+        return Layer(places, colours, hidden=False, hides=False)
 
-def _tube(points: Array, radius: float) -> tuple[Array, Array, NDArray[np.int64]]:
-    """Vertices, normals and faces of a tube along points, shape (n, 3) [m]."""
-    mesh = tube(points, radius, TRACE_SIDES)
-    around = mesh.vertices[:-2].reshape(len(points), TRACE_SIDES, 3) - points[:, None]
-    ends = points[[0, -1]] - points[[1, -2]]
-    normals = np.concatenate([around.reshape(-1, 3), ends])
-    return mesh.vertices, normals, mesh.faces
+    def _grid(self) -> Array:
+        """The floor's lines, equally wide in the picture: corners of triangles, shape (n, 3)."""
+        ends = grid_lines().reshape(-1, 2, 3)
+        shares = np.linspace(0, 1, PIECES + 1)[:, None]
+        points = ends[:, None, 0] + shares * (ends[:, None, 1] - ends[:, None, 0])
+        aside = np.cross(ends[:, 1] - ends[:, 0], (0, 0, 1))
+        aside /= np.linalg.norm(aside, axis=1, keepdims=True).clip(1e-9)
+        pixel = math.tan(math.radians(self.camera.field_of_view) / 2)
+        width = GRID_WIDTH * pixel * np.linalg.norm(points - self._eye, axis=2)[..., None]
+        right, left = points + width * aside[:, None], points - width * aside[:, None]
+        quads = [right[:, :-1], right[:, 1:], left[:, 1:]]
+        quads += [right[:, :-1], left[:, 1:], left[:, :-1]]
+        return np.stack(quads, axis=2).reshape(-1, 3)
+
+
+def _single(meshes: Sequence[Mesh]) -> Mesh:
+    """Join meshes, in single precision."""
+    vertices, normals, faces = Mesh.joined(meshes).with_normals()
+    return Mesh(single(vertices), faces, single(normals))
+
+
+def _lit(finish: Finish, places: Array, normals: Array, eye: Array, glow: Array) -> Array:
+    """Colours of a surface's points, with opacity, from 0 to 255, shape (n, 4).
+
+    Parameters
+    ----------
+    finish
+        Of the surface.
+    places, normals : ndarray, shape (n, 3)
+        Points [m], and unit normals there.
+    eye, glow : ndarray, shape (3,)
+        Where the camera is [m], and light that the surface sends out.
+    """
+    colour, gloss = single(to_linear(channels(finish.colour))), 2 / finish.roughness**4
+    mirror = 0.04 + (colour - 0.04) * finish.metalness
+    body = colour * (1 - finish.metalness)
+    view = eye - places
+    view /= np.linalg.norm(view, axis=1, keepdims=True)
+    mirrored = 2 * (view * normals).sum(axis=1, keepdims=True) * normals - view
+    light = glow + body * _room(normals) + 0.6 * mirror * _room(mirrored)
+    for towards, power in LIGHTS:
+        half = view + towards
+        half /= np.linalg.norm(half, axis=1, keepdims=True).clip(1e-9)
+        cosine = (normals @ towards).clip(0)[:, None]
+        shine = (normals * half).sum(axis=1, keepdims=True).clip(0) ** gloss * (gloss + 8) / 8
+        light = light + power * cosine * (body + mirror * shine)
+    encoded = 255 * to_srgb(light).clip(0, 1)
+    return np.insert(encoded.astype(np.uint8), 3, 255, axis=1)
+
+
+def _room(directions: Array) -> Array:
+    """How bright the room is in directions, shape (n, 1)."""
+    brightness: Array = ROOM + directions @ SLOPE
+    return brightness
+
+
+def _ball(place: ArrayLike, radius: float, colour: tuple[float, ...]) -> Layer:
+    """A ball of a colour with opacity, from 0 to 255, that glows [m]."""
+    mesh = capsule(0.0, radius).moved(place)
+    places = mesh.vertices[mesh.faces.ravel()]
+    return Layer(places, np.tile(colour, (len(places), 1)), hides=False)
+
+
+def _disc() -> Array:
+    """The floor about the origin: corners of triangles, shape (n, 3) [m]."""
+    radii = np.append(0, np.geomspace(0.5, FLOOR_RADIUS, 24))
+    mesh = lathe([(0.0, radius) for radius in radii])
+    return mesh.vertices[mesh.faces.ravel()]
+
+
+def _on_floor(places: Array) -> Array:
+    """Where the sun casts shadows of places onto the floor [m]."""
+    x, y, z = SUN_PLACE
+    height = places[:, 2].clip(0)
+    return np.stack([places[:, 0] - height * x / z, places[:, 1] - height * y / z, 0 * height], 1)

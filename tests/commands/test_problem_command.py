@@ -71,6 +71,7 @@ def test_show_prints_what_can_be_read_again(run, write):
 
 
 def test_check_of_the_papers_third_task(run, write, tmp_path):
+    pytest.importorskip("raylib")
     answer = run(
         "kinarm-problem", "check", "both", "--trials", 20, "--json", "a.json", "--picture", "a.png"
     )

@@ -184,6 +184,17 @@ class TestJointOrigins:
             farthest = np.fmax(farthest, distance)
         assert (farthest > 0.6 * length).all()
 
+    def test_links_on_either_side_of_a_turning_joint_count_as_one(self, make_joint, write_robot):
+        # The second axis lies along the upper arm: no turn brings the third one farther out.
+        joints = [
+            make_joint(axis="0 1 0"),
+            make_joint(xyz="0 0 0.3", rpy="0.7 0 0", axis="0 0.6442176872 0.7648421873"),
+            make_joint(xyz="0.05 0 0", axis="0 1 0"),
+        ]
+        arm = Arm.load(write_robot(joints, tool="0 0 0.2"))
+        expected = [np.hypot(0.3, 0.05) + 0.2, 0.25, 0.2]
+        np.testing.assert_allclose(bounds_of(arm).length, expected, atol=1e-9)
+
     def test_slides_count_with_their_longer_side(self, arms):
         lengths = link_lengths(arms["gantry"].chain)
         expected = [0.3 + 0.5, 0.05 + 0.3, np.hypot(0.1, 0.2), 0.3]

@@ -224,6 +224,7 @@ class TestPictures:
         assert record_path(passing.world, sway, goal=(0.0, 0.65, 0.325)).contact[1] == "ball"
 
     def test_pictures_show_the_time(self, passing):
+        pytest.importorskip("raylib")
         goal, q = (0.0, 0.65, 0.325), np.zeros(6)
         moved = replace(passing.scene.obstacles[-1], position=(0.3, 0.0, 0.45), motion=None)
         resting = Renderer(problem(moved), width=120, height=90).render(q, goal)
@@ -232,6 +233,7 @@ class TestPictures:
         assert (renderer.render(q, goal) != resting).any()
 
     def test_environments_show_it_too(self, passing):
+        pytest.importorskip("raylib")
         env = gymnasium.make("kinarm/Reach-v0", problem=passing.problem, render_mode="rgb_array")
         _, _ = env.reset(seed=0)
         first = env.render()

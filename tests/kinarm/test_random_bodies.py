@@ -206,6 +206,7 @@ class TestEpisodes:
 
 
 def test_environments_begin_in_the_scene_of_start_and_goal(changing, scenarios):
+    pytest.importorskip("raylib")
     env = gymnasium.make("kinarm/Reach-v0", problem=changing.problem, render_mode="rgb_array")
     pictures = []
     for start, goal in zip(*(each[:2] for each in scenarios), strict=True):

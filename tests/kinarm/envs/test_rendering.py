@@ -14,6 +14,8 @@ from kinarm.envs import ReachEnv, ReachGoalEnv, ReachVectorEnv
 from kinarm.errors import InvalidInputError
 from kinarm.viewer import Renderer, live_server
 
+pytest.importorskip("raylib")
+
 SMALL = {"width": 64, "height": 48}
 
 

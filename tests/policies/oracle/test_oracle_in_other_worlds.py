@@ -2,7 +2,9 @@
 
 import numpy as np
 import pytest
+from known_arms import INSTALLED
 from proofs import assert_identical, assert_reference_agrees, drawn, replayed
+from scipy.optimize import minimize
 
 from kinarm.arm import Arm
 from kinarm.policies import Oracle
@@ -35,6 +37,28 @@ def posts(make_joint, make_collision, write_robot):
         for placed in (tuple(obstacles), PAPER_BENCHES[1:])
     )
     return among, without, np.array([-1.2, 0.0]), arm.tool_position([1.2, 0.0])
+
+
+@INSTALLED
+def test_goals_beyond_a_stretched_arm_are_proven_out_of_reach():
+    """At the edge of its reach an arm of seven joints has many postures; a ball holds them all."""
+    oracle = Oracle(PROBLEMS["both"].replace(arm="xarm7"), threads=1)
+    arm, shoulder = oracle.simulator.arm, np.array([0, 0, 0.267])
+
+    def shortness(q):
+        return -np.linalg.norm(arm.tool_position(q) - shoulder)
+
+    guesses = np.random.default_rng(2).uniform(arm.lower, arm.upper, (12, 7))
+    within = list(zip(arm.lower, arm.upper, strict=True))
+    reach = -min(minimize(shortness, guess, bounds=within).fun for guess in guesses)
+    angles = np.linspace(-2.5, 2.5, 6)
+    outward = np.stack([np.cos(angles), np.sin(angles), np.full(6, 0.3)], axis=1)
+    outward /= np.linalg.norm(outward, axis=1, keepdims=True)
+    known = oracle.solve_batch(arm.home, shoulder + (reach + TOLERANCE + 0.003) * outward)
+    assert (known.steps_lower_bound == HORIZON + 1).all()
+    assert known.proof_complete.all()
+    near = oracle.solve_batch(arm.home, shoulder + (reach + TOLERANCE - 0.003) * outward)
+    assert (near.distance_lower_bound <= TOLERANCE).all()
 
 
 class TestOtherWorlds:

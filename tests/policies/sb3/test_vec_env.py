@@ -185,6 +185,7 @@ class TestAttributes:
 
 class TestPictures:
     def test_a_picture_shows_all_arms(self):
+        pytest.importorskip("raylib")
         env = sb3_vec_env(FLAT, 3, seed=0, render_mode="rgb_array", **SIZE)
         env.reset()
         picture, images = env.render(), env.get_images()

@@ -1,1 +1,0 @@
-"""Compiled kernels of the renderer: triangles to samples, light and pixels."""
