@@ -86,7 +86,7 @@ def _shipped(request: "EvaluationRequest", named: list[ReachProblem]) -> list[Co
         if group_of(name).rpartition("-")[2] in serving
         for contestant in find_contestants(name)
     ]
-    behind = [each.shielded() for each in shipped if each.recipe == BEST]
+    behind = [each.shielded() for each in shipped if each.recipe == BEST and not request.shield]
     return [*shipped, *behind, *BASELINES.values()]
 
 

@@ -92,7 +92,7 @@ def rollout_digests() -> dict[str, str]:
             groups = (f"ars-paper-{task}", "ars-tuned-both", "ppo-tuned-both", "ppo-best-both")
             for group in (*groups, f"ppo-paper-{task}") if arm == "paper" else groups:
                 policy = load_policy(f"{group}-seed1")
-                shift = np.linspace(-0.5, 0.5, simulator.n_observations)
+                shift = np.linspace(-0.5, 0.5, policy.n_observations)
                 found[f"rollouts {arm} {task} {group.rpartition('-')[0]}"] = led_to(
                     json.dumps([layer.weights.tolist() for layer in policy.layers]),
                     of_rollouts(simulator.rollout(policy, starts, goals, record=True, shift=shift)),
