@@ -77,6 +77,7 @@ class Run:
         name: str = "policy",
     ) -> None:
         policy.check_arm(simulator.arm)
+        simulator = simulator.seen_as(policy.observation)
         world, time_step = simulator.world, simulator.problem.stepping.time_step
         if world.has_random_bodies or len(world.contact_model.shapes.moving):
             raise ProblemError("a run does not know where bodies are that are random or move")

@@ -124,6 +124,8 @@ class TestShippedProblems:
         problem = ReachProblem.load(name)
         assert problem.name == name
         assert name == f"{name.rpartition('-')[0]}-{problem.arm.name}"
+        if name.partition("-")[0] in ("crossing", "hard", "obstacles", "pose"):
+            return  # these are named by what is asked
         scene = find_scene(name.rpartition("-")[0])
         for parts in ("obstacles", "goal_regions"):  # their sizes may suit the arm
             names = [part.name for part in getattr(scene, parts)]
