@@ -137,7 +137,7 @@ class Policy:
         """
         given = np.asarray(observations, dtype=float)
         shape = (self.n_observations,) if given.ndim == 1 else (None, self.n_observations)
-        x = finite_array("observations", given, shape)
+        x = finite_array("observations, as policy.observation has them,", given, shape)
         side = None if self.mirror is None else self.mirror.side
         actions: NDArray[np.float64] = choose_action(np, self.arrays, [*self.activations], side, x)
         return actions

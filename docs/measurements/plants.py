@@ -158,9 +158,13 @@ def run(
     """Drive arms by a policy, or by actions, shape (n, horizon, n_actions).
 
     Returns which succeeded and touched, shape (n,), and the paths of actuated joints, shape (n,
-    horizon + 1, n_actions).
+    horizon + 1, n_actions). Resolved rates are of commanded joints in every manner.
     """
     simulator, plant = arm.simulator, arm.simulator.problem.plant
+    watched = simulator.world
+    if isinstance(policy, Policy):
+        watched = simulator.seen_as(policy.observation).world
+    rates = watched.layout.places.get("resolved_rate", slice(0, 0))
     manner = manner or Manner(plant.feedback)
     n, n_actions = len(starts), simulator.n_actions
     horizon = round(simulator.task.horizon / manner.speed)
@@ -181,9 +185,13 @@ def run(
             seen[:, :n_actions] += float(plant.range_of("noise")[0]) * rng.normal(
                 size=(n, n_actions)
             )
-        actions = (
-            policy(world.observe(seen, goals)) if isinstance(policy, Policy) else policy[:, step]
-        )
+        if isinstance(policy, Policy):
+            observed = watched.observe(seen, goals)
+            seen[:, :n_actions] = commands[-1]
+            observed[:, rates] = watched.observe(seen, goals)[:, rates]
+            actions = policy(observed)
+        else:
+            actions = policy[:, step]
         actions = manner.speed * np.clip(actions, -1, 1)
         if manner.shield:
             shield.step(told, actions)
@@ -272,7 +280,7 @@ if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("out", type=Path)
     parser.add_argument("--trials", type=int, default=1000)
-    parser.add_argument("--transfer", nargs="*", metavar="POLICY", help="by default, four")
+    parser.add_argument("--transfer", nargs="*", metavar="POLICY", help="by default, three")
     given = parser.parse_args()
     given.out.mkdir(parents=True, exist_ok=True)
     if given.transfer is not None:
