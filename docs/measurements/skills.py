@@ -85,6 +85,7 @@ def main() -> None:
             row["minutes"] = round(float(np.median(spent)) / 60, 2)
         rows = [*(row for row in rows if row["problem"] != name), *found]
         record = {"trials": TRIALS, "seed": SEED, "rows": rows}
+        RECORD.parent.mkdir(parents=True, exist_ok=True)
         write_text(RECORD, json.dumps(record, indent=1) + "\n")
 
 

@@ -174,7 +174,9 @@ class TransferResults:
         shipped = [
             problem
             for problem in problems
-            if problem.arm.name == SOURCE.arm.name and not missing_mirror(problem)
+            if problem.arm.name == SOURCE.arm.name
+            and problem.observation == SOURCE.observation
+            and not missing_mirror(problem)
         ]
         for learner in self._study.learners:
             for problem in (*shipped, targets()[-1]):

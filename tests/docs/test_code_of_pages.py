@@ -25,8 +25,6 @@ EXCEPTIONS = {
     r"make ": "does what .ci/run does; that the targets exist is tested beside the README",
     r"kinarm --print-completion": "writes into the home; tests/kinarm/test_command_line.py",
     r"kinarm-eval --trials 200( --markdown)?$": "make eval does it",
-    r"kinarm-train ppo --recipe best .*(ur5|so101)": "does as the line about the Panda",
-    r"kinarm-eval --policy (ur5|so101) ": "needs what those lines train",
     r"pip install": "changes the installation",
     r"pip download|tar -x|kinarm-problem import .*ur5": "needs a download; tests/kinarm",
     r"\. \.venv/bin/activate": "changes the shell; tests/packaging/first_steps.py",

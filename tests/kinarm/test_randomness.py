@@ -16,7 +16,7 @@ def test_a_stream_is_what_it_was():
     """Its numbers are part of what a seed means."""
     first = [stream_generator(stream, 7, 3).integers(1 << 32) for stream in Stream]
     assert first == [
-        *(482907703, 3422100537, 4029689759, 2107721511, 1560255718, 3954885235),
+        *(482907703, 3422100537, 4029689759, 1560255718, 3954885235),
         2259174533,
     ]
 

@@ -1,5 +1,7 @@
 """Runs on fake arms: commands are the simulator's motion; what goes wrong stops them at rest."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -262,9 +264,16 @@ class TestRefusals:
             Run(make().arm, policy, moved)
 
     def test_memory_of_measurements(self, make, policy, simulator):
-        other = Simulator(simulator.problem.replace(observation={"history": 2}), threads=1)
+        shown = replace(policy.observation, history=2)
+        seen = replace(policy.provenance, problem=policy.problem.replace(observation=shown))
+        twice = [np.concatenate([each, each]) for each in (policy.mean, policy.std)]
+        first = policy.layers[0]
+        wide = first._replace(weights=np.concatenate([first.weights, first.weights], axis=1))
+        layers = (wide, *policy.layers[1:])
+        made = {"provenance": seen, "layers": layers, "mean": twice[0], "std": twice[1]}
+        other = replace(policy, mirror=None, residual=False, **made)
         with pytest.raises(InvalidInputError, match="sees a history takes commanded"):
-            Run(make().arm, policy, other, measured=True)
+            Run(make().arm, other, simulator, measured=True)
 
     def test_changed_folder(self, policy, tmp_path):
         export_policy(policy, tmp_path / "out", onnx=False)
