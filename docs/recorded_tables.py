@@ -141,23 +141,22 @@ def plans_table() -> str:
 def factors_table() -> str:
     """What a change of a recipe is worth, in percentage points of success."""
     rows = []
-    for name in ("ars_factors",):
-        record = json.loads((RESULTS / name / "learners.json").read_text(encoding="utf-8"))
-        titles = {each["name"]: each["title"] for each in record["learners"]}
-        first, *others = record["results"]
-        for row in (first, *others):
-            success, change = row["success"], row["success"]["value"] - first["success"]["value"]
-            low, high = success["ci95"]
-            rows.append(
-                [
-                    f"`{titles[first['learner']]}`",
-                    "as it is" if row is first else titles[row["learner"]],
-                    f"{100 * success['value']:.1f} ({100 * low:.1f}..{100 * high:.1f})",
-                    "" if row is first else f"{100 * change:+.1f}",
-                    f"{100 * min(row['success_each']):.1f}",
-                    f"{100 * row['collision']['value']:.1f}",
-                ]
-            )
+    record = json.loads((RESULTS / "ars_factors" / "learners.json").read_text(encoding="utf-8"))
+    titles = {each["name"]: each["title"] for each in record["learners"]}
+    first, *others = record["results"]
+    for row in (first, *others):
+        success, change = row["success"], row["success"]["value"] - first["success"]["value"]
+        low, high = success["ci95"]
+        rows.append(
+            [
+                f"`{titles[first['learner']]}`",
+                "as it is" if row is first else titles[row["learner"]],
+                f"{100 * success['value']:.1f} ({100 * low:.1f}..{100 * high:.1f})",
+                "" if row is first else f"{100 * change:+.1f}",
+                f"{100 * min(row['success_each']):.1f}",
+                f"{100 * row['collision']['value']:.1f}",
+            ]
+        )
     heads = ["recipe", "change", "success % (95 %)", "points", "worst seed %", "collision %"]
     return markdown_table(heads, rows)
 
@@ -184,18 +183,23 @@ def leaderboard_table() -> str:
 
 
 def _leaderboard_row(row: Mapping[str, Any]) -> list[str]:
-    success, *interval = (f"{100 * each:.1f}" for each in row["success"])
     shares = (row[name] for name in ("collision", "replaced"))
     numbers = (row["parameters"], row["training_steps"])
     return [
         row["problem"],
         f"`{row['policy']}`",
-        f"{success} ({'..'.join(interval)})",
+        _success_of(row),
         *("" if each is None else f"{100 * each:.1f}" for each in shares),
         "" if row["step_ratio"] is None else f"{row['step_ratio']:.2f}",
         str(len(row["seeds"])),
         *("" if each is None else f"{each:,}" for each in numbers),
     ]
+
+
+def _success_of(row: Mapping[str, Any]) -> str:
+    """Success in percent, with its interval if it is known."""
+    success, *interval = (f"{100 * each:.1f}" for each in row["success"])
+    return f"{success} ({'..'.join(interval)})" if interval else success
 
 
 def failures_table() -> str:
@@ -242,10 +246,8 @@ def skills_table() -> str:
     for problem, (bare, behind) in faced.items():
         shown = []
         for row in (bare, behind):
-            success, *interval = (f"{100 * each:.1f}" for each in row["success"])
             worst = min(share for share, _ in row["seeds"].values())
-            spread = f" ({'..'.join(interval)})" if interval else ""
-            shown += [f"{success}{spread}", f"{100 * worst:.1f}", f"{100 * row['collision']:.2f}"]
+            shown += [_success_of(row), f"{100 * worst:.1f}", f"{100 * row['collision']:.2f}"]
         ratio = "" if behind["step_ratio"] is None else f"{behind['step_ratio']:.2f}"
         oracle = f"{100 * behind['oracle']:.1f}"
         end = [oracle, ratio, f"{behind['speed']:.2f}", f"{behind['minutes']:.1f}"]

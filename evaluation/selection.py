@@ -26,7 +26,10 @@ VARYING = ("seed", "vec_normalize")
 
 
 def select_pairs(request: "EvaluationRequest") -> list[Pair]:
-    """Decide who faces which problem; the oracle joins on every one."""
+    """Decide who faces which problem; the oracle joins on every one.
+
+    Behind a shield come those that are asked to or learnt so; unasked, the recipes `BEST`, too.
+    """
     named = _named_problems(request)
     chosen = _named_contestants(request, named) if request.policies else _shipped(request, named)
     check_normalizing(chosen, request.vec_normalize)
@@ -34,7 +37,10 @@ def select_pairs(request: "EvaluationRequest") -> list[Pair]:
     behind = [
         each.shielded()
         for each, without in zip(chosen, bare, strict=True)
-        if each not in UNTRAINED.values() and (request.shield or each is not without)
+        if each not in UNTRAINED.values()
+        and (
+            request.shield or each is not without or (each.recipe == BEST and not request.policies)
+        )
     ]
     chosen = [*bare, *(each for each in behind if each not in bare)]
     changed = partial(_changed, request)
@@ -71,8 +77,7 @@ def _changed(request: "EvaluationRequest", problem: ReachProblem) -> ReachProble
 def _shipped(request: "EvaluationRequest", named: list[ReachProblem]) -> list[Contestant]:
     """Shipped policies for the arm and the named problems; then the baselines.
 
-    Those of recipes `BEST` come behind a shield, too. Names say what policies were trained for:
-    others are not opened.
+    Names say what policies were trained for: others are not opened.
     """
     serving = {
         name
@@ -86,8 +91,7 @@ def _shipped(request: "EvaluationRequest", named: list[ReachProblem]) -> list[Co
         if group_of(name).rpartition("-")[2] in serving
         for contestant in find_contestants(name)
     ]
-    behind = [each.shielded() for each in shipped if each.recipe == BEST and not request.shield]
-    return [*shipped, *behind, *BASELINES.values()]
+    return [*shipped, *BASELINES.values()]
 
 
 def _named_contestants(request: "EvaluationRequest", named: list[ReachProblem]) -> list[Contestant]:

@@ -164,7 +164,7 @@ def run(
     watched = simulator.world
     if isinstance(policy, Policy):
         watched = simulator.seen_as(policy.observation).world
-    rates = watched.layout.places.get("resolved_rate", slice(0, 0))
+    rates = watched.layout.places.get("resolved_rate")
     manner = manner or Manner(plant.feedback)
     n, n_actions = len(starts), simulator.n_actions
     horizon = round(simulator.task.horizon / manner.speed)
@@ -187,8 +187,9 @@ def run(
             )
         if isinstance(policy, Policy):
             observed = watched.observe(seen, goals)
-            seen[:, :n_actions] = commands[-1]
-            observed[:, rates] = watched.observe(seen, goals)[:, rates]
+            if rates is not None:
+                seen[:, :n_actions] = commands[-1]
+                observed[:, rates] = watched.observe(seen, goals)[:, rates]
             actions = policy(observed)
         else:
             actions = policy[:, step]

@@ -43,10 +43,13 @@ def judged(policies: Mapping[str, Policy]) -> list[dict[str, Any]]:
         faced = request.evaluate()
     (oracle,) = (each for each in faced if each.contestant is ORACLE)
     rows = rows_of([each for each in faced if each is not oracle])
+    shared = {
+        "oracle": float(oracle.rollouts.success.mean()),
+        "speed": speed_at_goal([*policies.values()]),
+    }
     for row in rows:
         del row["failures"]
-        row["oracle"] = float(oracle.rollouts.success.mean())
-        row["speed"] = speed_at_goal([*policies.values()])
+        row |= shared
     return rows
 
 

@@ -196,9 +196,8 @@ class PPOConfig(TrainingConfig):
     @property
     def can_extend(self) -> bool:
         """Whether a longer training begins just as this one goes."""
-        settled = self.widening == 0 and self.initial_penalty == 1
-        unset = self.final_log_std is None
-        return self.learning_rate_schedule == "constant" and settled and unset
+        settled = self.widening == 0 and self.initial_penalty == 1 and self.final_log_std is None
+        return self.learning_rate_schedule == "constant" and settled
 
     def start_spread_at(self, done: float) -> float:
         """Spread of the start configurations after this share of the training."""
