@@ -179,7 +179,7 @@ class Arm:
         """Velocity limits of the joints, shape (n_joints,) [rad/s or m/s]."""
         return self.chain.velocity_limits
 
-    @property
+    @cached_property
     def joint_names(self) -> tuple[str, ...]:
         """Names of the joints, from the base to the tool."""
         return tuple(self.model.names)[1:]

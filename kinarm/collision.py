@@ -163,11 +163,17 @@ class ContactModel:
         return pool
 
     @cached_property
-    def workspace(self) -> tuple[pin.Data, pin.GeometryData, list[coal.CollisionResult]]:
-        """Data of Pinocchio and Coal, and results of each pair."""
+    def workspace(
+        self,
+    ) -> tuple[
+        pin.Data, pin.GeometryData, list[coal.CollisionRequest], list[coal.CollisionResult]
+    ]:
+        """Data of Pinocchio and Coal, and requests and results of each pair."""
         data = make_verdicts_reliable(self.geometry.createData())
-        # A list, since wrapping results takes longer than the test itself.
-        return self.arm.model.createData(), data, list(data.collisionResults)
+        # Lists, since wrapping a request or result takes longer than the test itself.
+        requests, results = list(data.collisionRequests), list(data.collisionResults)
+        start_anew(requests)
+        return self.arm.model.createData(), data, requests, results
 
     @cached_property
     def measuring(self) -> pin.GeometryData:
@@ -249,20 +255,21 @@ class ContactModel:
         index = self.first_in_contact(configuration)
         if index is None:
             return None
-        point = np.array(self.workspace[2][index].getContact(0).pos)
+        point = np.array(self.workspace[3][index].getContact(0).pos)
         return Contact(configuration, self.pair_names[index], point)
 
     def first_in_contact(self, configuration: NDArray[np.float64]) -> int | None:
         """Index of the first tested pair that is in contact, or None."""
         if not self.movable and not self.in_contact(configuration[None])[0]:
             return None
-        data, geometry_data, results = self.workspace
-        start_anew(geometry_data.collisionRequests)
+        data, geometry_data, requests, results = self.workspace
         asked = (self.arm.model, data, self.geometry, geometry_data, configuration, True)
-        if not pin.computeCollisions(*asked):
-            return None
-        # Pairs are tested in order up to the first in contact; later results are of other calls.
-        return next(index for index, result in enumerate(results) if result.isCollision())
+        index = None
+        if pin.computeCollisions(*asked):
+            # Pairs are tested in order up to the first in contact; later results are older.
+            index = next(index for index, result in enumerate(results) if result.isCollision())
+        start_anew(requests[: len(requests) if index is None else index + 1])
+        return index
 
     def __reduce__(self) -> tuple[type, tuple[object, ...]]:
         return type(self), tuple(getattr(self, item.name) for item in fields(self))

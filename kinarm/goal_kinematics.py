@@ -14,15 +14,15 @@ from kinarm.collision import ContactModel
 from kinarm.episodes import Pursuit, Rules
 from kinarm.errors import LARGEST, InvalidInputError, ProblemError, finite_array
 from kinarm.goals import Cone, Goals, quaternion_between, unit
-from kinarm.inverse_kinematics import InverseKinematics, approach_axis
+from kinarm.inverse_kinematics import SEEDS, InverseKinematics, approach_axis
 from kinarm.kernels.compiling import Array
 from kinarm.kernels.goals import GoalRules, fill_reached
 from kinarm.kernels.kinematics import POSE
 from kinarm.kernels.records import recorded
 from kinarm.problem import ReachProblem
 
-SOLUTIONS = (4, 64)
-"""Configurations at a goal that are tried in turn."""
+SOLUTIONS = ((4, 64), (16, 1024), (64, 1024))
+"""Configurations at a goal that are tried in turn, and the seeds that look for them, at most."""
 
 SAMPLE = 64
 """Goals that show whether an arm reaches any."""
@@ -121,7 +121,9 @@ class GoalKinematics(InverseKinematics):
             listed = [unit(np.roll(pin.Quaternion(turn).coeffs(), 1)) for turn in turns]
         return goals.with_rests(np.array(listed) if listed else unknown)
 
-    def configurations_at(self, goals: Array, most: int) -> tuple[Array, NDArray[np.int64]]:
+    def configurations_at(
+        self, goals: Array, most: int, seeds: int = SEEDS
+    ) -> tuple[Array, NDArray[np.int64]]:
         """Configurations at goals, shape (m, n_joints) [rad or m], and the goal of each.
 
         Only actuated joints move. Where none is exact, errors may be as large as the tolerances.
@@ -130,13 +132,13 @@ class GoalKinematics(InverseKinematics):
         ----------
         goals : ndarray, shape (n, goal_width)
             Goals, all with a rest or none, which is NaN.
-        most : int
-            Largest number for a goal.
+        most, seeds : int
+            Largest numbers for a goal, of configurations and of seeds.
         """
         task, rests = self.problem.task, goals[:, 3:]
         positions, goal = np.ascontiguousarray(goals[:, :3]), task.goal
         if goal.kind == "position" or np.isnan(rests).any():
-            solutions = self.inverse_kinematics(positions, most=most)
+            solutions = self.inverse_kinematics(positions, most=most, seeds=seeds)
             return solutions.configurations, solutions.owner
         if goal.kind == "configuration":
             return np.ascontiguousarray(rests), np.arange(len(goals))
@@ -150,6 +152,7 @@ class GoalKinematics(InverseKinematics):
             None if goal.kind == "pose" else rests,
             joints=self.arm.n_actuated,
             most=most,
+            seeds=seeds,
             position_tolerance=task.tolerance,
             rotation_tolerance=goal.rotation_tolerance,
         )
@@ -171,11 +174,21 @@ class GoalKinematics(InverseKinematics):
         """
         filled, found = goals.copy(), np.zeros(len(goals), dtype=bool)
         unknown = np.isnan(goals[:, 3:]).sum(axis=1) > 0
-        for most in SOLUTIONS:
-            rows = np.flatnonzero(~found)
-            q, owner = self.configurations_at(goals[rows], most)
-            owner = rows[owner]
-            free = ~self.screened(q, scenes[owner] if len(scenes) else scenes)[1]
+        pending = np.arange(len(goals))
+        for most, seeds in SOLUTIONS:
+            if not len(pending):
+                break
+            q, owner = self.configurations_at(goals[pending], most, seeds)
+            owner = pending[owner]
+            there = scenes[owner] if len(scenes) else scenes
+            _, free, touching, _ = self.proven(q, there)
+            found[owner[free]] = True
+            if most == SOLUTIONS[-1][0]:
+                # Coal is slow: it is asked where no configuration is proven to be free.
+                asked = ~(found[owner] | touching)
+                there = there[asked] if len(there) else there
+                free[asked] = ~self.contact_model.touching(q[asked], there)
+            pending = np.setdiff1d(owner, owner[free])
             rows, first, counts = np.unique(owner[free], return_index=True, return_counts=True)
             found[rows] = True
             wanted = unknown[rows]
@@ -197,8 +210,10 @@ class GoalKinematics(InverseKinematics):
         fill_reached(recorded(self.arm.chain), self.rules.goal, q, poses, rows)
         return rows
 
-    def screened(self, q: Array, scenes: Array | None = None) -> tuple[Array, NDArray[np.bool_]]:
-        """Tool points of configurations, and which touch something, as `kinarm.World` tells."""
+    def proven(
+        self, q: Array, scenes: Array | None = None
+    ) -> tuple[Array, NDArray[np.bool_], NDArray[np.bool_], int]:
+        """Tool points of configurations, and what kernels prove of these; see `kinarm.World`."""
         raise NotImplementedError
 
     def check_scenarios(self, starts: ArrayLike, goals: ArrayLike) -> tuple[Array, Array]:

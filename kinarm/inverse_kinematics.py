@@ -25,7 +25,7 @@ ISOLATED_SEPARATION, CONTINUUM_SEPARATION = 1e-3, 0.2
 """Least difference in some joint of isolated and of other solutions [rad or m]."""
 
 SEEDS, LEAST_SEEDS = 1024, 128
-"""Seeds: at most, and at least for isolated solutions."""
+"""Seeds: at most by default, and at least for isolated solutions."""
 
 LOT = 1024
 """Targets solved together."""
@@ -89,6 +89,7 @@ class InverseKinematics(Kinematics):
         joints: int | None = None,
         turns: bool = False,
         most: int = 64,
+        seeds: int = SEEDS,
         separation: float | None = None,
         position_tolerance: float = POSITION_TOLERANCE,
         rotation_tolerance: float = ROTATION_TOLERANCE,
@@ -125,6 +126,9 @@ class InverseKinematics(Kinematics):
             Give solutions that differ by whole turns one by one.
         most : int
             Largest number of solutions of a target, before contact and turns.
+        seeds : int
+            Largest number of seeds that look for them. Where there are solutions, one of the first
+            32 finds one nearly always; without, all are tried.
         separation : float, optional
             Least difference of two solutions in some joint; by default 0.001 if
             they are isolated, else 0.2 [rad or m].
@@ -142,7 +146,7 @@ class InverseKinematics(Kinematics):
         start = within_limits("near", start, arm.chain, arm.joint_names)
         for name, each in (("position", position_tolerance), ("rotation", rotation_tolerance)):
             check_range(f"{name}_tolerance", each, NOT_NEGATIVE)
-        search = self._search(axes, start, joints, separation)._replace(
+        search = self._search(axes, start, joints, separation, seeds)._replace(
             position_tolerance=position_tolerance, rotation_tolerance=rotation_tolerance
         )
         configurations, owner = self._solutions(search, positions, wanted, most)
@@ -211,7 +215,7 @@ class InverseKinematics(Kinematics):
         return np.concatenate([np.empty((0, n_joints)), *found]), owner
 
     def _search(
-        self, axes: Array, near: Array, joints: int | None, separation: float | None
+        self, axes: Array, near: Array, joints: int | None, separation: float | None, seeds: int
     ) -> Search:
         """Check and complete a search."""
         moved = _moved(self.arm, axes) if joints is None else joints
@@ -228,7 +232,7 @@ class InverseKinematics(Kinematics):
             position_tolerance=POSITION_TOLERANCE,
             rotation_tolerance=ROTATION_TOLERANCE,
             near=near,
-            seeds=low_discrepancy_points(SEEDS, moved),
+            seeds=low_discrepancy_points(whole_number("seeds", seeds, 1), moved),
             least=LEAST_SEEDS if isolated else 0,
             separation=float(separation),
         )

@@ -40,11 +40,12 @@ def stream_generator(stream: Stream, seed: int, *numbers: int) -> np.random.Gene
     return np.random.default_rng(np.random.SeedSequence(seed, spawn_key=key))
 
 
+@cache
 def low_discrepancy_points(count: int, dimensions: int) -> NDArray[np.float64]:
     """Points that fill the unit cube evenly, shape (count, dimensions).
 
     They are multiples of powers of a root of x^(d + 1) = x + 1, modulo 1; for d = 1, of the golden
-    ratio (Roberts 2018).
+    ratio (Roberts 2018). All callers share them, and do not change them.
     """
     return (0.5 + np.arange(1, count + 1)[:, None] * _strides(dimensions)) % 1.0
 
