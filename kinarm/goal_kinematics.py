@@ -180,14 +180,7 @@ class GoalKinematics(InverseKinematics):
                 break
             q, owner = self.configurations_at(goals[pending], most, seeds)
             owner = pending[owner]
-            there = scenes[owner] if len(scenes) else scenes
-            _, free, touching, _ = self.proven(q, there)
-            found[owner[free]] = True
-            if most == SOLUTIONS[-1][0]:
-                # Coal is slow: it is asked where no configuration is proven to be free.
-                asked = ~(found[owner] | touching)
-                there = there[asked] if len(there) else there
-                free[asked] = ~self.contact_model.touching(q[asked], there)
+            free = self.free(q, scenes[owner] if len(scenes) else scenes)[1]
             pending = np.setdiff1d(owner, owner[free])
             rows, first, counts = np.unique(owner[free], return_index=True, return_counts=True)
             found[rows] = True
@@ -210,10 +203,8 @@ class GoalKinematics(InverseKinematics):
         fill_reached(recorded(self.arm.chain), self.rules.goal, q, poses, rows)
         return rows
 
-    def proven(
-        self, q: Array, scenes: Array | None = None
-    ) -> tuple[Array, NDArray[np.bool_], NDArray[np.bool_], int]:
-        """Tool points of configurations, and what kernels prove of these; see `kinarm.World`."""
+    def free(self, q: Array, scenes: Array) -> tuple[Array, NDArray[np.bool_]]:
+        """Tool points of configurations, and which count as free; see `kinarm.World`."""
         raise NotImplementedError
 
     def check_scenarios(self, starts: ArrayLike, goals: ArrayLike) -> tuple[Array, Array]:

@@ -27,7 +27,7 @@ def draw_scenarios(
     at one of the task's configurations, without contact and farther from the
     goal's position than the tolerance. If the task asks for it, goals without a free
     configuration are drawn again. If none is found in 2000 attempts, that is
-    a `kinarm.ProblemError`.
+    a `kinarm.ProblemError`. `kinarm.World.free` says what counts as free.
 
     Parameters
     ----------
@@ -86,9 +86,9 @@ def draw_for_each(
             starts[pending, :n_actions] = lower + uniforms * extent
         proposed = starts[pending]
         scenes = world.scenes_of(proposed, aims)
-        tools, touching = world.screened(proposed, scenes)
+        tools, free = world.free(proposed, scenes)
         x, y, z = (tools - aims[:, :3]).T
-        rejected = touching | (np.sqrt(x * x + y * y + z * z) <= task.tolerance)
+        rejected = ~free | (np.sqrt(x * x + y * y + z * z) <= task.tolerance)
         if solved:
             missed = ~rejected
             tried = pending[missed]
