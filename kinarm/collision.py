@@ -165,9 +165,7 @@ class ContactModel:
     @cached_property
     def workspace(
         self,
-    ) -> tuple[
-        pin.Data, pin.GeometryData, list[coal.CollisionRequest], list[coal.CollisionResult]
-    ]:
+    ) -> tuple[pin.Data, pin.GeometryData, list[coal.CollisionRequest], list[coal.CollisionResult]]:
         """Data of Pinocchio and Coal, and requests and results of each pair."""
         data = make_verdicts_reliable(self.geometry.createData())
         # Lists, since wrapping a request or result takes longer than the test itself.

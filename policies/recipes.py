@@ -16,10 +16,11 @@ from kinarm.problem import PROBLEMS, ReachProblem
 PER_TRAINING = ("problem", "seed")
 """Settings that vary between trainings with a recipe."""
 
-CONDITIONS = ("where_regions_differ", "where_goals_are_noisy")
+CONDITIONS = ("where_regions_differ", "where_more_is_asked")
 """Under which a recipe may have other settings.
 
-Several regions are to be reached that no reflection joins; goals are not seen where they are.
+Several regions are to be reached that no reflection joins; or more is asked than points that stand
+and are seen where they are, among bodies that all episodes share and that rest.
 """
 
 RECIPE_REACH = 1.264
@@ -140,7 +141,7 @@ def _adapted(config: ConfigT, special: Mapping[tuple[str, str], Mapping[str, Any
 
     problem, changes = config.problem, dict[str, Any]()
     changes["symmetric"] = symmetric = not missing_mirror(problem)
-    held = (different_regions(problem, symmetric) > 1, problem.plant.range_of("goal_noise")[1] > 0)
+    held = (different_regions(problem, symmetric) > 1, _asks_more(problem))
     for condition in compress(CONDITIONS, held):
         config = replace(config, **special.get((config.recipe, condition), {}))
     scale = problem.task.tolerance / PROBLEMS["right"].task.tolerance
@@ -150,3 +151,10 @@ def _adapted(config: ConfigT, special: Mapping[tuple[str, str], Mapping[str, Any
     relative = round(problem.load_arm().reach / RECIPE_REACH, 2)
     changes["reward"] = replace(weights, progress=weights.progress / relative)
     return replace(config, **changes)
+
+
+def _asks_more(problem: ReachProblem) -> bool:
+    """Whether it is harder than `CONDITIONS` say."""
+    goal, scene = problem.task.goal, problem.scene
+    unseen = problem.plant.range_of("goal_noise")[1] > 0
+    return unseen or goal.number > 0 or goal.changes or bool(scene.moving or scene.random_bodies)

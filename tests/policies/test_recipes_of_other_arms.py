@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from kinarm.policies import find_learner, recipe, train_policy
-from kinarm.problem import PROBLEMS
+from kinarm.problem import PROBLEMS, ReachProblem
 
 SCALE = 0.5
 """A power of two, by which lengths are scaled without rounding."""
@@ -115,9 +115,25 @@ def test_regions_that_are_images_of_each_other_count_once():
     assert recipe("ars", "tuned", problem=unlike).net_arch == (16,)
 
 
-def test_where_goals_are_not_seen_where_they_are():
-    noisy = recipe("ppo", "best", problem=PROBLEMS["both"].replace(goal_noise=(0.0, 0.01)))
-    assert (noisy.training_tolerance, noisy.training_hold) == (0.03, 1)
-    assert noisy.reward.collision == -6.0
-    blurred = recipe("ppo", "best", problem=PROBLEMS["both"].replace(noise=0.01))
-    assert blurred == replace(recipe("ppo", "best", problem="both"), problem=blurred.problem)
+@pytest.mark.parametrize(
+    "asked",
+    [
+        {"goal_noise": (0.0, 0.01)},
+        {"goal": {"kind": "pose"}},
+        {"goal": {"sequence": 3}},
+        {"scene": ReachProblem.load("crossing-paper").scene},
+    ],
+    ids=str,
+)
+def test_where_more_is_asked(asked):
+    harder = recipe("ppo", "best", problem=PROBLEMS["both"].replace(**asked))
+    assert (harder.training_tolerance, harder.training_hold) == (0.03, 1)
+    assert harder.reward.collision == -5.0
+
+
+@pytest.mark.parametrize("asked", [{"noise": 0.01}, {"goal": {"hold": 10}}], ids=str)
+def test_where_points_stand(asked):
+    problem = PROBLEMS["both"].replace(**asked)
+    assert recipe("ppo", "best", problem=problem) == replace(
+        recipe("ppo", "best", problem="both"), problem=problem
+    )
