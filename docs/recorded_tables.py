@@ -258,8 +258,21 @@ def skills_table() -> str:
     return markdown_table(heads, rows)
 
 
+def hard_table() -> str:
+    """What policies for joints that lag reach in MuJoCo."""
+    record = json.loads((RESULTS / "skills" / "mujoco.json").read_text(encoding="utf-8"))
+    rows = []
+    for shielded, name in enumerate(("bare", "behind a shield")):
+        seeds = [row for row in record["rows"] if row["shield"] == bool(shielded)]
+        success, contact = ([100 * row[each] for row in seeds] for each in ("success", "contact"))
+        figures = [f"{sum(success) / len(seeds):.1f}", f"{min(success):.1f}"]
+        rows.append([name, str(len(seeds)), *figures, f"{sum(contact) / len(seeds):.2f}"])
+    return markdown_table(["`hard-paper`", "seeds", "success %", "worst seed %", "contact %"], rows)
+
+
 RECORDED = {
     "skills": skills_table,
+    "hard": hard_table,
     "leaderboard": leaderboard_table,
     "failures": failures_table,
     "failures-to-watch": watching_table,

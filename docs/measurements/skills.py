@@ -19,6 +19,7 @@ from kinarm import Simulator
 from kinarm._files import write_text
 from kinarm.evaluation import EvaluationRequest, Study
 from kinarm.evaluation.contestants import ORACLE
+from kinarm.evaluation.experiments.experiment import Experiment
 from kinarm.evaluation.trials import TrialSet
 from kinarm.policies import Policy
 
@@ -72,7 +73,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
     parser.add_argument("folder", type=Path, help="folder of the study")
     study = Study.load(parser.parse_args().folder)
-    rows: list[dict[str, Any]] = []
+    order, rows = Experiment.load("skills").problems, list[dict[str, Any]]()
     if RECORD.exists():
         rows = json.loads(RECORD.read_text(encoding="utf-8"))["rows"]
     for group in study.groups():
@@ -87,6 +88,7 @@ def main() -> None:
         for row in found:
             row["minutes"] = round(float(np.median(spent)) / 60, 2)
         rows = [*(row for row in rows if row["problem"] != name), *found]
+        rows.sort(key=lambda row: order.index(row["problem"]))
         record = {"trials": TRIALS, "seed": SEED, "rows": rows}
         RECORD.parent.mkdir(parents=True, exist_ok=True)
         write_text(RECORD, json.dumps(record, indent=1) + "\n")

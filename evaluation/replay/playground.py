@@ -17,7 +17,7 @@ from kinarm.world import World
 if TYPE_CHECKING:
     from kinarm.evaluation.replay.request import ReplayRequest
 
-PLAYED = ("ppo-best-both", "ars-linear-both", "ars-paper-both")
+PLAYED = ("ppo-best-both", "ppo-best-hard-paper", "ars-linear-both", "ars-paper-both")
 """Policies that a playground has by default."""
 
 OFFERED = 20

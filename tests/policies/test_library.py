@@ -16,7 +16,7 @@ from kinarm.policies.library import (
     policy_files,
     policy_names,
 )
-from kinarm.problem import PROBLEMS
+from kinarm.problem import PROBLEMS, ReachProblem
 from kinarm.problem_options import ProblemOptions
 
 NAMES = ("ars-paper-left-seed0", "ars-tuned-right-seed0", "ars-tuned-right-seed10", "ppo-both")
@@ -70,7 +70,7 @@ def test_every_shipped_policy_loads_and_fits_its_arm(shipped_arms):
         policy = load_policy(name)
         made = policy.provenance
         policy.check_arm(shipped_arms[made.problem.arm.name])
-        shipped = PROBLEMS[made.problem.name]
+        shipped = ReachProblem.load(made.problem.name)
         assert made.problem.faced_as(shipped).first_difference(shipped) is None
         assert made.problem.arm.digest == shipped.arm_digest
         assert name == f"{made.algorithm}-{made.recipe}-{made.problem.name}-seed{made.seed}"
