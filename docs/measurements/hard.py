@@ -1,7 +1,7 @@
 """Policies for joints that lag, in MuJoCo: ``python -m docs.measurements.hard POLICY``.
 
-Each trial has servos, a delay, limits of acceleration and noise, as the problem ``hard-paper`` draws
-draws them. The exported policy sees measured joint positions and remembers the rest, as on an arm.
+Each trial has servos, a delay, limits of acceleration and noise, drawn as those of ``hard-paper``.
+The exported policy sees measured joint positions and remembers the rest, as on an arm.
 ``data/results/skills/mujoco.json`` keeps what the training seeds reach, bare and behind a shield of
 their commands; `docs.tables` makes a table of it.
 """
