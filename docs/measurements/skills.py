@@ -1,8 +1,8 @@
 """What one recipe learns: ``python -m docs.measurements.skills FOLDER`` judges its trainings.
 
 FOLDER is that of ``kinarm-study skills --out FOLDER``. Its policies face trials that nothing else
-draws, bare and behind a shield; ``data/results/skills/skills.json`` keeps what they reach, and
-`docs.tables` makes a table of it. Problems that it has with as many trainings are not judged again.
+draws, bare and behind a shield; ``data/results/skills/skills.json`` keeps what they reach, beside
+the rows of other problems, and `docs.tables` makes a table of it.
 """
 
 import argparse
@@ -69,7 +69,7 @@ def speed_at_goal(policies: list[Policy]) -> float:
 
 
 def main() -> None:
-    """Judge what the record lacks."""
+    """Judge the finished trainings."""
     parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
     parser.add_argument("folder", type=Path, help="folder of the study")
     study = Study.load(parser.parse_args().folder)
@@ -78,9 +78,6 @@ def main() -> None:
         rows = json.loads(RECORD.read_text(encoding="utf-8"))["rows"]
     for group in study.groups():
         name = group.config.problem.name
-        known = [row for row in rows if row["problem"] == name]
-        if known and len(known[0]["seeds"]) == len(group.runs):
-            continue
         runs = [run for run in study.finished if run.config.problem.name == name]
         policies = {f"ppo-best-{name}-seed{run.config.seed}.npz": study.policy(run) for run in runs}
         found = judged(policies)
