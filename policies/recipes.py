@@ -154,7 +154,7 @@ def _adapted(config: ConfigT, special: Mapping[tuple[str, str], Mapping[str, Any
 
 
 def _asks_more(problem: ReachProblem) -> bool:
-    """Whether it is harder than `CONDITIONS` say."""
+    """Whether more is asked than `CONDITIONS` say."""
     goal, scene = problem.task.goal, problem.scene
     unseen = problem.plant.range_of("goal_noise")[1] > 0
     return unseen or goal.number > 0 or goal.changes or bool(scene.moving or scene.random_bodies)
