@@ -11,7 +11,7 @@ INSTALLED = $(VENV)/.installed-$(1)-$(MODULES)
 
 .PHONY: eval test test-slow test-rare campaign mutants lint docs package aarch64 clean
 
-eval: $(call INSTALLED,core) ## evaluate all shipped policies on 200 trials a task
+eval: $(call INSTALLED,core) ## evaluate what ships for the three tasks on 200 trials each
 	$(BIN)/kinarm-eval --trials 200
 
 PYTEST := $(BIN)/python -m pytest --dist loadfile --no-loadscope-reorder --durations=25

@@ -1,4 +1,4 @@
-"""The leaderboard: ``python -m docs.leaderboard`` scores all that ships or was submitted.
+"""The leaderboard: ``python -m docs.leaderboard`` scores what ships for it or was submitted.
 
 ``python -m docs.leaderboard data/leaderboard/mine.toml`` scores this submission alone, and leaves
 other rows as they are. The record lies beside the shipped policies; `docs.tables` makes pages of

@@ -138,7 +138,7 @@ class EvaluationRequest(ProblemOptions, TableOptions):
     }
     DEFAULTS: ClassVar = {
         **ProblemOptions.DEFAULTS,
-        "policies": "all shipped policies, random and zero",
+        "policies": "those that ship for the paper's tasks, random and zero",
         "problems": "what each policy was trained for",
         "against": "the first named policy",
         "columns": "all that fit",

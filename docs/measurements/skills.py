@@ -17,9 +17,8 @@ import numpy as np
 from docs.leaderboard import rows_of
 from kinarm import Simulator
 from kinarm._files import write_text
-from kinarm.evaluation import EvaluationRequest, Study
+from kinarm.evaluation import EvaluationRequest, Experiment, Study
 from kinarm.evaluation.contestants import ORACLE
-from kinarm.evaluation.experiments.experiment import Experiment
 from kinarm.evaluation.trials import TrialSet
 from kinarm.policies import Policy
 

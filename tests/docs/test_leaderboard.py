@@ -24,10 +24,10 @@ def test_every_shipped_policy_and_submission_has_rows(recorded):
     """After shipping others: ``python -m docs.leaderboard``."""
     rows = {(row["policy"], row["problem"]): row for row in recorded["rows"]}
     for name in policy_names():
-        problem = group_of(name).split("-", 2)[2]
-        # What ships for all problems is symmetric; policies for others have no rows.
-        problems = PROBLEMS if problem == "both" and "-paper-" not in name else [problem]
-        for problem in PROBLEMS.keys() & {*problems}:
+        _, named, trained_for = group_of(name).split("-", 2)
+        # What is ours for both is symmetric; what is for a problem of its own has no rows.
+        faced = PROBLEMS if named != "paper" and trained_for == "both" else {trained_for}
+        for problem in PROBLEMS.keys() & faced:
             bare = rows[group_of(name), problem]
             shielded = rows[f"{group_of(name)}+shield", problem]
             assert name in bare["seeds"]
