@@ -13,7 +13,7 @@ from sphinx.util.docutils import SphinxDirective
 from kinarm._command_line import Parser
 from kinarm.evaluation.report.templating import markdown_table
 
-BESIDE = {"kinarm-run": ["check"], "kinarm-study": ["status", "curves"]}
+BESIDE = {"kinarm-run": ["check"], "kinarm-study": ["status"]}
 """First words that a program answers with a parser of its own, which its own one does not know."""
 
 EVERYWHERE = ("help", "version")

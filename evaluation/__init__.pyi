@@ -1,6 +1,5 @@
 from .bounds import oracle_bounds as oracle_bounds
 from .contestants import Contestant as Contestant
-from .curves import LearningCurves as LearningCurves
 from .document import EvaluationDocument as EvaluationDocument
 from .evaluation import Evaluation as Evaluation
 from .evaluation import evaluate as evaluate

@@ -4,15 +4,14 @@ import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, ClassVar, Literal
+from typing import TYPE_CHECKING, ClassVar
 
 from kinarm._command_line import run_request
 from kinarm._console import open_console
 from kinarm._fields import Checked
-from kinarm._files import check_output
 from kinarm._interrupts import GOES_ON, telling
 from kinarm._parallel import available_threads
-from kinarm._tables import CHOOSE, TableOptions, print_columns, print_table
+from kinarm._tables import CHOOSE, TableOptions, print_columns
 from kinarm.errors import InvalidInputError, TrainingFailedError
 
 if TYPE_CHECKING:
@@ -181,31 +180,6 @@ class StudyRequest(RunningOptions, TableOptions):
 
 
 @dataclass(frozen=True, kw_only=True)
-class CurvesRequest(Checked):
-    """Draw learning curves, means over seeds with their 95 % intervals.
-
-    Parameters
-    ----------
-    sources : tuple of str
-        Groups of seeds: NAME.curve.csv of kinarm, evaluations.npz or
-        monitor.csv of Stable-Baselines3, folders of these, or quoted patterns.
-    measure : {"success", "return"}
-        What they show.
-    out : Path
-        The picture to write (.png).
-    overwrite : bool
-        Replace an earlier picture.
-    """
-
-    sources: tuple[str, ...] = field(metadata={"flag": "sources", "metavar": "[LABEL=]FILES"})
-    measure: Literal["success", "return"] | None = None
-    out: Path = field(default=Path("curves.png"), metadata={"metavar": "FILE.png"})
-    overwrite: bool = False
-
-    DEFAULTS: ClassVar = {"measure": "success, if all files tell it"}
-
-
-@dataclass(frozen=True, kw_only=True)
 class StatusRequest:
     """Say how far an experiment is.
 
@@ -223,8 +197,6 @@ def main(arguments: Sequence[str] | None = None) -> None:
     typed = sys.argv[1:] if arguments is None else arguments
     if typed[:1] == ["status"]:
         run_request(f"{PROG} status", StatusRequest, _status, typed[1:])
-    if typed[:1] == ["curves"]:
-        run_request(f"{PROG} curves", CurvesRequest, _draw, typed[1:])
     run_request(PROG, StudyRequest, _carry_out, typed)
 
 
@@ -250,22 +222,6 @@ def _carry_out(request: StudyRequest, command: str) -> None:
 
 SHOWN = 20
 """Rows that are printed."""
-
-
-def _draw(request: CurvesRequest, command: str) -> None:  # noqa: ARG001
-    """Draw learning curves, and print where they end."""
-    from kinarm.evaluation.curves import LearningCurves
-    from kinarm.evaluation.figures import save_figure
-
-    check_output(request.out, overwrite=request.overwrite, suffix=".png")
-    curves = LearningCurves.load(request.sources, request.measure)
-    rows = [
-        (label, f"{band.seeds}", f"{band.places[-1]:,.0f}", *(f"{e[-1]:.3f}" for e in band[2:]))
-        for label, band in curves.bands.items()
-    ]
-    print_table(("group", "seeds", "steps", f"last {curves.measure}", "low", "high"), rows)
-    paths = save_figure(curves.figure(), request.out.parent, request.out.stem)
-    print(f"written: {' and '.join(map(str, paths))}")
 
 
 def _status(request: StatusRequest, command: str) -> None:  # noqa: ARG001

@@ -11,11 +11,10 @@ from numpy.typing import NDArray
 
 from kinarm._files import write_text
 from kinarm._tables import csv_text
-from kinarm.evaluation.curves import Band
 from kinarm.evaluation.experiments import table
 from kinarm.evaluation.experiments.plan import Run
 from kinarm.evaluation.experiments.table import Group, identity, shorter, shown
-from kinarm.evaluation.figures import COLOURS, panels_figure, save_figure
+from kinarm.evaluation.figures import COLOURS, Band, panels_figure, save_figure
 from kinarm.evaluation.report.templating import markdown_table, template_environment
 from kinarm.evaluation.statistics import share_over_seeds
 from kinarm.policies.provenance import package_versions, source_commit

@@ -42,7 +42,6 @@ def test_help_loads_nothing_heavy():
         *(
             "kinarm-run check",
             "kinarm-study status",
-            "kinarm-study curves",
             "kinarm-train ars",
             "kinarm-train ppo",
         ),

@@ -12,8 +12,6 @@ import pytest
 from small_studies import contents
 
 from kinarm.evaluation.experiments.study import Study
-from kinarm.policies.learners import CurvePoint
-from kinarm.policies.training import write_curve
 
 STUDY = """
 problems = ["right"]
@@ -79,26 +77,6 @@ def test_what_is_finished_can_be_written_without_training(run, file, tmp_path):
     answer = run("kinarm-study", file, "--out", out, "--no-train")
     assert (answer.status, answer.out) == (0, "no training is finished\n")
     assert not out.exists()
-
-
-def test_the_command_draws_and_tells_the_ends(run, tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    (tmp_path / "right").mkdir()
-    for seed, last in enumerate((0.2, 0.4)):
-        points = [
-            CurvePoint(0.0, 0.0, success, steps, 0.0) for steps, success in ((1e3, 0), (2e3, last))
-        ]
-        write_curve(tmp_path / f"right/ars-seed{seed}.curve.csv", points)
-    answer = run("kinarm-study", "curves", "ARS=right")
-    assert (answer.status, answer.err) == (0, "")
-    assert answer.out.splitlines()[1].split()[:4] == ["ARS", "2", "2,000", "0.300"]
-    assert answer.out.splitlines()[-1] == "written: curves.png and curves.svg"
-    assert "ARS, 2 seeds" in (tmp_path / "curves.svg").read_text()
-    again = run("kinarm-study", "curves", "ARS=right")
-    assert (again.status, "--overwrite" in again.err) == (2, True)
-    missing = run("kinarm-study", "curves", "wrong", "--out", "other.png")
-    assert missing.status == 2
-    assert "there is no learning curve 'wrong'" in missing.err
 
 
 def test_failures(run, file, tmp_path, monkeypatch):
