@@ -13,8 +13,6 @@ from .outcomes import Outcomes as Outcomes
 from .replay.choosing import find_failures as find_failures
 from .replay.request import ReplayRequest as ReplayRequest
 from .replay.runs import record as record
-from .report.card import policy_card as policy_card
-from .report.card import write_card as write_card
 from .report.page import report_page as report_page
 from .report.page import write_report as write_report
 from .request import EvaluationRequest as EvaluationRequest

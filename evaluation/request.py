@@ -82,9 +82,6 @@ class EvaluationRequest(ProblemOptions, TableOptions):
         Folder for evaluation.json.
     report : Path
         Folder for the report: index.html, one page.
-    card : Path
-        Card of the one policy that is named (.md), with the policy (.npz) and a
-        replay (.html).
     json : bool
         Print the JSON document alone on standard output.
     markdown : bool
@@ -123,7 +120,6 @@ class EvaluationRequest(ProblemOptions, TableOptions):
     hold: bool = False
     out: Path | None = field(default=None, metadata={"metavar": "FOLDER"})
     report: Path | None = field(default=None, metadata={"metavar": "FOLDER"})
-    card: Path | None = None
     json: bool = False
     markdown: bool = False
 
@@ -133,7 +129,7 @@ class EvaluationRequest(ProblemOptions, TableOptions):
         ),
         "trials": "trials seed oracle hold",
         "table": "columns csv markdown json",
-        "output": "out report card overwrite",
+        "output": "out report overwrite",
         "changes to the problems": ProblemOptions.CHANGES.replace("shield ", ""),
     }
     DEFAULTS: ClassVar = {
@@ -225,11 +221,6 @@ class EvaluationRequest(ProblemOptions, TableOptions):
 
             tell("writing the report")
             write_report(self.report, document, evaluations)
-        if self.card is not None:
-            from kinarm.evaluation.report.card import write_card
-
-            tell("writing the card")
-            write_card(self.card, document, evaluations)
         if self.csv is not None:
             from kinarm.evaluation.table import all_columns, every_row
 
@@ -255,10 +246,6 @@ class EvaluationRequest(ProblemOptions, TableOptions):
         for contestant, problem in pairs:
             arm = arms[problem.name]
             contestant.check(problem, arm, allow_other_arm=self.allow_other_arm)
-        if self.card is not None:
-            from kinarm.evaluation.report.card import check_card
-
-            check_card(self.card, pairs, overwrite=self.overwrite)
         written = [self.report / REPORT] if self.report else []
         if self.out is not None:
             written.append(self.out / DOCUMENT)

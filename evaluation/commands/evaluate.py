@@ -34,9 +34,6 @@ def _report(request: EvaluationRequest, command: str) -> None:
         written.append(f"{request.out / DOCUMENT}")
     if request.report is not None:
         written.append(f"{request.report / REPORT}")
-    if request.card is not None:
-        beside = f"{request.card.stem}.npz and {request.card.stem}.html"
-        written.append(f"{request.card}, {beside}")
     for files in written:
         console.print(f"written: {files}", style="dim", soft_wrap=True)
 

@@ -1,4 +1,4 @@
-"""Templates of all pages and cards, and tables in Markdown."""
+"""Templates of all pages, and tables in Markdown."""
 
 import math
 from collections.abc import Iterable, Sequence
@@ -23,18 +23,9 @@ def template_environment(**settings: Any) -> "Environment":
         log10=math.log10,
         tenth=lambda length: f"{length:.1f}".removesuffix(".0"),
         percent=lambda share: f"{100 * share:.1f} %",
-        code=markdown_code,
         dashes=lambda text: text.replace("..", "\N{EN DASH}"),
     )
     return environment
-
-
-def markdown_code(value: object) -> str:
-    """A name from a file as code, also in a table: it shows as it is, and does nothing."""
-    text = str(value)
-    if not isinstance(value, str):
-        return text
-    return "`{}`".format(" ".join(text.split()).replace("`", "'").replace("|", "\\|"))
 
 
 def markdown_table(header: Sequence[str], rows: Iterable[Sequence[str]]) -> str:

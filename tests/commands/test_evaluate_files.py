@@ -43,7 +43,7 @@ def test_files_are_the_same_from_every_process(run, run_outside, policy_folder, 
 def test_the_report_of_more_trials_than_are_bounded(run, policy_folder, tmp_path, monkeypatch):
     monkeypatch.setattr(bounds, "MOST_BOUNDED", 4)
     arguments = ("--policy", policy_folder / "mine-seed0.npz", "--trials", 9, "--hold")
-    files = ("--report", tmp_path, "--out", tmp_path, "--card", tmp_path / "card.md")
+    files = ("--report", tmp_path, "--out", tmp_path)
     answer = run("kinarm-eval", *arguments, *files)
     assert (answer.status, answer.err) == (0, "")
     assert "not asked" in (tmp_path / "index.html").read_text(encoding="utf-8")

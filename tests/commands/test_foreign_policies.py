@@ -1,4 +1,4 @@
-"""Command lines on policies that are not kinarm's own, and cards."""
+"""Command lines on policies that are not kinarm's own."""
 
 import json
 import sys
@@ -79,20 +79,3 @@ class TestModule:
         answer = run(command, "--policy", module, "--problem", "left", "--trials", 3)
         assert answer.status == 0, answer.err
         assert module in answer.out
-
-
-class TestCard:
-    def test_of_a_file(self, run, here, policy):
-        policy.save("mine.npz")
-        arguments = ("--policy", "mine.npz", "--trials", 4, "--card", "mine.md")
-        answer = run("kinarm-eval", *arguments)
-        assert answer.status == 0, answer.err
-        assert "written: mine.md, mine.npz and mine.html" in answer.out
-        text = (here / "mine.md").read_text()
-        assert "kinarm-eval --policy mine.npz --trials 4 --card mine.md" in text
-        assert (here / "mine.html").is_file()
-        check_refused(run("kinarm-eval", *arguments), "mine.md' exists", "--overwrite")
-        assert run("kinarm-eval", *arguments, "--overwrite").status == 0
-        assert (here / "mine.md").read_text() == text.replace(
-            "--card mine.md", "--card mine.md --overwrite"
-        )
