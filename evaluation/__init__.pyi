@@ -10,7 +10,6 @@ from .finding import find_contestants as find_contestants
 from .metrics import METRICS as METRICS
 from .metrics import Metric as Metric
 from .outcomes import Outcomes as Outcomes
-from .replay.choosing import find_failures as find_failures
 from .replay.request import ReplayRequest as ReplayRequest
 from .replay.runs import record as record
 from .report.page import report_page as report_page

@@ -3,7 +3,6 @@
 from collections import Counter
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
-from itertools import chain, product
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -76,56 +75,6 @@ def chosen_recordings(request: "ReplayRequest") -> Chosen:
     else:
         chosen = trials[: candidates.played]
     return Chosen(_with_bounds(candidates, chosen, oracle=request.oracle))
-
-
-def find_failures(
-    policies: Sequence[str],
-    problems: Sequence[str] = ("left", "right", "both"),
-    *,
-    trials: int = FAILING,
-    seed: int = 0,
-) -> Chosen:
-    """Record all failures of policies, and the oracle in the same trials.
-
-    They are grouped by recipe and cause, the most frequent cause first.
-
-    Parameters
-    ----------
-    policies : sequence of str
-        As `ReplayRequest` takes them.
-    problems : sequence of str
-        Problems of one arm and scene.
-    trials, seed : int
-        Number of trials of each problem, and their seed.
-
-    Returns
-    -------
-    Chosen
-        For `kinarm.viewer.replay_page`; ``runs`` are those of the policies and
-        of the oracle.
-
-    Raises
-    ------
-    KinarmError
-        If a name or number cannot be used, or too few or too many trials
-        failed.
-    """
-    found = []
-    for policy, problem in product(policies, problems):
-        drawn = TrialSet.draw(problem, trials, seed)
-        faced = record(_first_contestant(policy, drawn.problem), drawn)
-        found.append(_failures(Candidates([(each,) for each in faced], trials, drawn), oracle=True))
-    played, ghosts = (list(chain(*(each.runs[run] for each in found))) for run in (0, 1))
-    _check_room(len(played), trials * len(found), "trials")
-    recipes = [group_of(recording.policy) for recording in played]
-    causes = chain(*(each.groups for each in found))
-    groups = [f"{recipe}: {cause}" for recipe, cause in zip(recipes, causes, strict=True)]
-    order = sorted(_most_frequent_first(groups), key=lambda k: recipes.index(recipes[k]))
-    return Chosen(
-        [[run[k] for k in order] for run in (played, ghosts)],
-        [groups[k] for k in order],
-        f"{len(played)} of {trials * len(found)} trials of {', '.join(problems)} failed",
-    )
 
 
 def _find_candidates(request: "ReplayRequest") -> Candidates:
@@ -268,9 +217,14 @@ def _failures(candidates: Candidates, *, oracle: bool) -> Chosen:
     found = failure_causes(*ends)
     if not found:
         raise InvalidInputError(f"none of the {total} trials failed")
-    _check_room(len(found), total, "--trials")
+    if len(found) > MOST_FAILURES:
+        raise InvalidInputError(
+            f"{len(found)} of {total} trials failed, a page holds {MOST_FAILURES} at most: ask for "
+            "fewer --trials"
+        )
     failed, causes = list(found), list(map(str, found.values()))
-    order = _most_frequent_first(causes)
+    frequency = Counter(causes)
+    order = sorted(range(len(causes)), key=lambda k: (-frequency[causes[k]], causes[k]))
     trials = [candidates.trials[failed[k]] for k in order]
     runs = _with_bounds(candidates, trials, oracle=oracle)
     if oracle and len(runs) == 1 and candidates.faced is not None:
@@ -280,20 +234,6 @@ def _failures(candidates: Candidates, *, oracle: bool) -> Chosen:
     policy, problem = first[0].policy, first[0].problem.name
     heading = f"{policy}: {len(causes)} of {total} trials of {problem} failed"
     return Chosen(runs, [causes[k] for k in order], heading)
-
-
-def _check_room(failed: int, total: int, option: str) -> None:
-    if failed > MOST_FAILURES:
-        raise InvalidInputError(
-            f"{failed} of {total} trials failed, a page holds {MOST_FAILURES} at most: ask for "
-            f"fewer {option}"
-        )
-
-
-def _most_frequent_first(groups: Sequence[str]) -> list[int]:
-    """Indices of the groups in order of frequency."""
-    frequency = Counter(groups)
-    return sorted(range(len(groups)), key=lambda k: (-frequency[groups[k]], groups[k]))
 
 
 def _numbered(trials: Sequence[Trial], wanted: Collection[int]) -> list[Trial]:
