@@ -66,10 +66,6 @@ def chosen_recordings(request: "ReplayRequest") -> Chosen:
         return _failures(candidates, oracle=request.oracle)
     if request.trial:
         chosen = _numbered(trials, request.trial)
-    elif request.collisions:
-        chosen = [trial for trial in trials if trial[0].outcome == "collision"]
-        if not chosen:
-            raise InvalidInputError(f"none of the {len(trials)} trials ended in contact")
     elif request.worst is not None:
         chosen = _worst(trials, request.worst)
     else:
@@ -105,7 +101,7 @@ def _find_candidates(request: "ReplayRequest") -> Candidates:
 def _fresh_candidates(request: "ReplayRequest", names: Sequence[str | None]) -> Candidates:
     """Run policies on trials that are drawn now."""
     contestants, problem = named_contestants(request, names)
-    searched = request.trial or request.worst or request.collisions
+    searched = request.trial or request.worst
     count = request.trials or (FAILING if request.failures else SEARCHED if searched else PLAYED)
     trials = TrialSet.draw(problem, count, request.seed or 0)
     other = request.allow_other_arm

@@ -22,15 +22,13 @@ if TYPE_CHECKING:
     from kinarm.recording import Recording
     from kinarm.viewer.html_page import HtmlPage
 
-NOT_PLAYED = (
-    "source policy wrapper compare trial worst collisions failures oracle record live port browser"
-)
+NOT_PLAYED = "source policy wrapper compare trial worst failures oracle record live port browser"
 """Fields without meaning for a playground."""
 
-ALTERNATIVES = ("policy compare", "trial worst collisions failures")
+ALTERNATIVES = ("policy compare", "trial worst failures")
 """Fields that exclude each other."""
 
-NOT_LIVE = "source compare trial worst collisions failures trials out record"
+NOT_LIVE = "source compare trial worst failures trials out record"
 NOT_FROM_FILE = f"{ProblemOptions.CHANGES.removeprefix('arm ')} seed trials"
 """Fields without meaning for the live page, and for trials from a file."""
 
@@ -67,8 +65,6 @@ class ReplayRequest(ProblemOptions):
     worst : int
         Play the trials that ended farthest from their goals, this many; each
         trial once.
-    collisions : bool
-        Play the trials that ended in contact.
     failures : bool
         Play all trials that failed, in groups by cause, beside the oracle.
     trials : int
@@ -115,7 +111,6 @@ class ReplayRequest(ProblemOptions):
     compare: tuple[str, str] | None = field(default=None, metadata={"metavar": ("A", "B")})
     trial: tuple[int, ...] = field(default=(), metadata={"repeat": True, **FROM_ZERO})
     worst: int | None = None
-    collisions: bool = False
     failures: bool = False
     trials: int | None = None
     seed: int | None = field(default=None, metadata=FROM_ZERO)
@@ -136,7 +131,7 @@ class ReplayRequest(ProblemOptions):
 
     GROUPS: ClassVar = {
         "what is replayed": "source policy vec_normalize wrapper compare play allow_other_arm",
-        "which trials": "trials seed trial worst collisions failures oracle",
+        "which trials": "trials seed trial worst failures oracle",
         "output": "out record overwrite live port browser",
         **ProblemOptions.GROUPS,
     }

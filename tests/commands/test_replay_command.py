@@ -60,15 +60,6 @@ def test_the_best_policy_for_a_problem(replay, options, problem):
     assert f"{problem} 0, {best_policy(problem)}: " in answer.out
 
 
-def test_the_collisions_of_an_evaluation(replay, evaluation):
-    ends = outcomes_of(evaluation, "random")["outcome"]
-    expected = [number for number, end in enumerate(ends) if end == "collision"]
-    assert expected
-    answer = replay(evaluation, "--policy", "random", "--collisions", *QUICK)
-    assert played(answer) == expected
-    assert answer.out.count(" touches ") == len(expected)
-
-
 def test_a_request_does_the_same(run, tmp_path, policy_folder):
     policy, lines = policy_folder / "mine-seed0.npz", []
     command = ("--policy", policy, "--tolerance", 0.2, "--trials", 2)
@@ -93,9 +84,8 @@ def test_two_policies_on_the_same_trials(replay, tmp_path):
         (("--policy", "zero"), ["'zero'", "name a --problem"]),
         (("--policy", "ars-tuned-both", "--arm", "paper_flange"), ["trained for arm 'paper'"]),
         (("--policy", "zero", "--compare", "zero", "random"), ["--policy", "--compare"]),
-        (("--policy", "zero", "--worst", "3", "--collisions"), ["--worst", "--collisions"]),
+        (("--policy", "zero", "--worst", "3", "--failures"), ["--worst", "--failures"]),
         (("--policy", "zero", "--problem", "left", "--trial", "200"), ["no trial 200", "0 to 199"]),
-        (("--policy", "zero", "--problem", "left", "--collisions"), ["none of the 200 trials"]),
         (("--policy", "zero", "--problem", "left", "--port", "7001"), ["--live"]),
         (("--policy", "zero", "--problem", "left", "--live"), ["--out", "--live"]),
         (("--policy", "oracle", "--problem", "left", "--failures", "--trials", "9"), ["none of"]),
