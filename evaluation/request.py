@@ -48,13 +48,11 @@ class EvaluationRequest(ProblemOptions, TableOptions):
     policies : tuple of str
         Shipped policy, recipe (all its seeds), best, random, zero, oracle, .npz
         file, folder of them, Stable-Baselines3's model.zip (runs its code: only
-        if you trust it), or module:function; several, and repeatable.
+        if you trust it), or module:function; several, and repeatable. The others
+        are compared with the first, in the same trials.
     problems : tuple of str
         A problem by name, or a problem file; several, and repeatable.
         ``problem`` is for a single one.
-    against : str
-        What the others are compared with, in the same trials: a name or file as
-        for policies.
     trials : int
         Trials a problem.
     seed : int
@@ -106,9 +104,6 @@ class EvaluationRequest(ProblemOptions, TableOptions):
         default=(),
         metadata={"flag": "--problem", "metavar": "NAME_OR_FILE", "names": problem_names},
     )
-    against: str | None = field(
-        default=None, metadata={"metavar": "NAME_OR_FILE", "completes": policy_choices}
-    )
     trials: int = field(default=200, metadata=TRIALS)
     seed: int = field(default=0, metadata=FROM_ZERO)
     vec_normalize: Path | None = field(default=None, metadata={"metavar": "FILE|none"})
@@ -125,7 +120,7 @@ class EvaluationRequest(ProblemOptions, TableOptions):
 
     GROUPS: ClassVar = {
         "what is evaluated": (
-            "policies against problems vec_normalize wrapper shield matrix allow_other_arm"
+            "policies problems vec_normalize wrapper shield matrix allow_other_arm"
         ),
         "trials": "trials seed oracle hold",
         "table": "columns csv markdown json",
@@ -136,7 +131,6 @@ class EvaluationRequest(ProblemOptions, TableOptions):
         **ProblemOptions.DEFAULTS,
         "policies": "those that ship for the paper's tasks, random and zero",
         "problems": "what each policy was trained for",
-        "against": "the first named policy",
         "columns": "all that fit",
     }
     SHIELDS_POLICIES: ClassVar = True
@@ -148,12 +142,6 @@ class EvaluationRequest(ProblemOptions, TableOptions):
             raise InvalidInputError(f"{given[0]} and {given[1]} exclude each other")
         if self.json and self.columns:
             raise InvalidInputError("--columns is for tables, and --json prints the whole document")
-
-    @property
-    def contestants(self) -> tuple[str, ...]:
-        """Names and files of policies that are asked for, the reference included."""
-        asked = (*self.policies, self.against) if self.policies and self.against else self.policies
-        return tuple(dict.fromkeys(asked))
 
     def run(self, command: str | None = None, tell: Tell = lambda _: None) -> "EvaluationDocument":
         """Evaluate, and write the outputs.
@@ -170,7 +158,7 @@ class EvaluationRequest(ProblemOptions, TableOptions):
             document = evaluation_document(
                 evaluations,
                 repr(self) if command is None else command,
-                self.against or next(iter(self.policies), ""),
+                next(iter(self.policies), ""),
             )
             self._write(document, evaluations, tell)
         return document
@@ -186,7 +174,7 @@ class EvaluationRequest(ProblemOptions, TableOptions):
         from kinarm.evaluation.evaluation import run_trials
         from kinarm.evaluation.trials import TrialSet
 
-        named = ORACLE.name in (*self.policies, self.against)
+        named = ORACLE.name in self.policies
         problems = {problem.name: problem for _, problem in pairs}
         evaluations: list[Evaluation] = []
         say_choices(problems.values())
@@ -232,15 +220,13 @@ class EvaluationRequest(ProblemOptions, TableOptions):
 
     def _checked_pairs(self) -> "list[Pair]":
         """Who faces which problem, after checks of policies and files."""
-        from kinarm.evaluation.selection import check_reference, select_pairs
+        from kinarm.evaluation.selection import select_pairs
 
         if self.columns or self.csv:
             from kinarm.evaluation.table import all_columns
 
             self.check_table(all_columns())
         pairs = select_pairs(self)
-        if self.against:
-            check_reference(pairs, self.against)
         problems = {problem.name: problem for _, problem in pairs}
         arms = {name: problem.load_arm() for name, problem in problems.items()}
         for contestant, problem in pairs:

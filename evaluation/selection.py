@@ -9,7 +9,7 @@ from itertools import product
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from kinarm.errors import InvalidInputError, UnknownNameError
+from kinarm.errors import InvalidInputError
 from kinarm.evaluation.contestants import BASELINES, ORACLE, UNTRAINED, Contestant
 from kinarm.evaluation.finding import check_normalizing, find_contestants
 from kinarm.policies.library import BEST, group_of, is_shipped, policy_names
@@ -98,7 +98,7 @@ def _named_contestants(request: "EvaluationRequest", named: list[ReachProblem]) 
     """Contestants that are named, without repetition."""
     only = named[0] if len(named) == 1 else None
     found: dict[tuple[str, Path | None], Contestant] = {}
-    for name in request.contestants:
+    for name in dict.fromkeys(request.policies):
         if name != BEST:
             chosen = find_contestants(name, only, request.vec_normalize, request.wrapper)
             found |= {(each.name, each.source): each for each in chosen}
@@ -118,19 +118,6 @@ def is_called(contestant: Contestant, text: str) -> bool:
     path, source = Path(text).resolve(), contestant.source
     called = text in (contestant.name, group_of(contestant.name))
     return called or (source is not None and path in (source, source.parent))
-
-
-def check_reference(pairs: Iterable[Pair], text: str) -> None:
-    """Refuse a reference that nobody is called by, or that has nobody beside it."""
-    faced = [(contestant, problem.digest) for contestant, problem in pairs]
-    theirs = {problem for contestant, problem in faced if is_called(contestant, text)}
-    if not theirs:
-        raise UnknownNameError("policy", text, sorted({group_of(each.name) for each, _ in faced}))
-    others = (each for each, problem in faced if problem in theirs and each is not ORACLE)
-    if all(is_called(each, text) for each in others):
-        raise InvalidInputError(
-            f"nobody else faces a problem that {text!r} faces: name one with --problem"
-        )
 
 
 def _problems(request: "EvaluationRequest", chosen: list[Contestant]) -> list[ReachProblem]:
