@@ -9,8 +9,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kinarm._files import write_atomically
-from kinarm.evaluation.evaluation import Evaluation
-from kinarm.evaluation.selection import group_names
 from kinarm.evaluation.statistics import squared_reach
 
 if TYPE_CHECKING:
@@ -46,28 +44,6 @@ def panels_figure(
     for axes in panels.flat:
         axes.spines[["top", "right"]].set_visible(False)
     return figure, panels
-
-
-def series_labels(evaluations: Sequence[Evaluation]) -> list[str]:
-    """Name of each evaluation's group, with its training problem if different.
-
-    A symmetric policy for several goal regions has one name on all problems that it is for.
-    """
-    groups = group_names(evaluation.contestant for evaluation in evaluations)
-    return [_label(evaluation, groups[evaluation.contestant.name]) for evaluation in evaluations]
-
-
-def _label(evaluation: Evaluation, group: str) -> str:
-    policy, faced = evaluation.contestant.policy, evaluation.problem
-    if policy is None:
-        return evaluation.contestant.name
-    trained_for = policy.problem
-    own, others = (set(problem.task.goal_regions) for problem in (trained_for, faced))
-    symmetric = policy.mirror is not None and len(own) > 1
-    if symmetric and own >= others and trained_for.same_place(faced):
-        return group
-    origin = "" if trained_for.name == faced.name else f" (trained on {trained_for.name})"
-    return group.removesuffix(f"-{trained_for.name}") + origin
 
 
 class Band(NamedTuple):

@@ -1,6 +1,6 @@
 """Groups of a report, a policy or training seeds each, and worst trials."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import islice
@@ -10,10 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kinarm.errors import InvalidInputError
+from kinarm.evaluation.contestants import Contestant
 from kinarm.evaluation.document import EvaluationDocument, FacedProblem, PooledResult, Row
 from kinarm.evaluation.evaluation import Evaluation
-from kinarm.evaluation.figures import series_labels
 from kinarm.evaluation.replay.runs import record
+from kinarm.evaluation.selection import group_names
 from kinarm.evaluation.table import policy_label, table_rows
 from kinarm.evaluation.trials import TrialSet
 from kinarm.recording import Recording
@@ -105,22 +106,21 @@ def group_results(
     known = {(each.contestant.name, each.problem.name): each for each in evaluations}
     if list(known) != [(row.policy, row.problem) for row in document.results]:
         raise InvalidInputError("a report needs the document of the very evaluations that it shows")
-    labels = series_labels(evaluations)
-    styles, found = _styles(labels, evaluations), []
-    style_of = {pair: styles[label] for pair, label in zip(known, labels, strict=True)}
+    labels = group_names(each.contestant for each in evaluations)
+    styles = _styles({labels[each.contestant.name]: each.contestant for each in evaluations})
+    found = []
     for problem, entry in document.protocol.problems.items():
         groups = []
         for row in table_rows(document, problem):
             names = row.members if isinstance(row, PooledResult) else [row.policy]
             members = tuple(known[name, problem] for name in names)
-            groups.append(Group(row, members, style_of[names[0], problem]))
+            groups.append(Group(row, members, styles[labels[names[0]]]))
         found.append(ProblemResults(problem, entry, tuple(groups)))
     return tuple(found)
 
 
-def _styles(labels: Sequence[str], evaluations: Sequence[Evaluation]) -> dict[str, str]:
+def _styles(contestants: Mapping[str, Contestant]) -> dict[str, str]:
     """Classes by label, in the order of appearance."""
-    contestants = {label: each.contestant for label, each in zip(labels, evaluations, strict=True)}
     styles = {label: f"reference {each.name}" for label, each in contestants.items()}
     trained = (k for k, each in contestants.items() if each.algorithm not in UNTRAINED_ALGORITHMS)
     for number, label in enumerate(trained):
