@@ -17,9 +17,6 @@ T = TypeVar("T")
 SEEDS_PRIORITY, SPREAD_PRIORITY, ON_REQUEST = 16, 5, -1
 """`Metric.priority` of the number of seeds, of ranges over them, and of what ``--columns`` adds."""
 
-REPLACED = "* some settings of the recipe are replaced"
-"""Meaning of the star in a label."""
-
 
 class Cell(NamedTuple):
     """A figure as text, or empty, and its interval or other addition."""
@@ -116,7 +113,7 @@ def all_columns() -> list[Column[Row]]:
     """Every column that there can be: labels, the number of seeds, and the `METRICS`."""
     columns: list[Column[Row]] = [
         Column("problem", attrgetter("problem"), priority=ALWAYS, words=True),
-        Column("policy", policy_label, priority=ALWAYS, words=True),
+        Column("policy", attrgetter("policy"), priority=ALWAYS, words=True),
     ]
     for name, metric in METRICS.items():
         columns.append(metric_column(name, attrgetter("metrics")))
@@ -145,20 +142,6 @@ def telling_columns(rows: Sequence[Row], priority: float = 0) -> list[Column[Row
     """Metric columns of some priority that say something about rows."""
     columns = (column for column in metric_columns() if column.priority >= priority)
     return [column for column in columns if any(str(column.cell(row)) for row in rows)]
-
-
-def policy_label(row: Row) -> str:
-    """Name of a row's policy, with the star of replaced settings.
-
-    Names of files lack the star: ``ars-tuned-right`` is ``ars-tuned*-right``.
-    """
-    plain = row.recipe.removesuffix("*")
-    return row.policy.replace(f"{row.algorithm}-{plain}-", f"{row.algorithm}-{row.recipe}-", 1)
-
-
-def has_star(row: Row) -> bool:
-    """Whether the label of a row has the star of replaced settings."""
-    return row.recipe.endswith("*") and row.recipe in policy_label(row)
 
 
 def print_table(

@@ -41,17 +41,9 @@ def _report(request: EvaluationRequest, command: str) -> None:
 def _footnote(document: "EvaluationDocument") -> str:
     """Notes on the figures in the table."""
     from kinarm.evaluation.report.templating import template_environment
-    from kinarm.evaluation.table import REPLACED, every_row, has_star
 
-    protocol = document.protocol
     template = template_environment().get_template("footnote.txt")
-    text = template.render(
-        protocol=protocol,
-        results=document.results,
-        starred=any(map(has_star, every_row(document))),
-        replaced=REPLACED,
-    )
-    return text.rstrip()
+    return template.render(protocol=document.protocol, results=document.results).rstrip()
 
 
 main = partial(run_request, "kinarm-eval", EvaluationRequest, _report, skip=("problem",))

@@ -15,7 +15,7 @@ from kinarm.evaluation.document import EvaluationDocument, FacedProblem, PooledR
 from kinarm.evaluation.evaluation import Evaluation
 from kinarm.evaluation.replay.runs import record
 from kinarm.evaluation.selection import group_names
-from kinarm.evaluation.table import policy_label, table_rows
+from kinarm.evaluation.table import table_rows
 from kinarm.evaluation.trials import TrialSet
 from kinarm.recording import Recording
 from kinarm.scene import GoalRegion
@@ -44,7 +44,7 @@ class Group:
     @property
     def name(self) -> str:
         """Name in the table."""
-        return policy_label(self.row)
+        return self.row.policy
 
     @property
     def is_policy(self) -> bool:

@@ -13,10 +13,8 @@ from kinarm.evaluation.report import charts
 from kinarm.evaluation.report.groups import group_results, record_worst, worst_trials
 from kinarm.evaluation.report.templating import template_environment
 from kinarm.evaluation.table import (
-    REPLACED,
     SPREAD_PRIORITY,
     difference_columns,
-    has_star,
     metric_column,
     metric_columns,
     telling_columns,
@@ -68,9 +66,8 @@ def report_page(document: EvaluationDocument, evaluations: Sequence[Evaluation])
     problems = group_results(document, evaluations)
     chosen = [worst_trials(results) for results in problems]
     recordings = record_worst([worst for each in chosen for worst in each])
-    environment = template_environment(autoescape=True)
-    environment.tests["starred"] = has_star
-    return environment.get_template("page.html").render(
+    template = template_environment(autoescape=True).get_template("page.html")
+    return template.render(
         protocol=document.protocol,
         problems=problems,
         differences=document.differences,
@@ -81,6 +78,5 @@ def report_page(document: EvaluationDocument, evaluations: Sequence[Evaluation])
         replay=replay_page(recordings).html,
         charts=charts,
         success_cell=metric_column("success", attrgetter("metrics")).cell,
-        replaced=REPLACED,
         early_steps=EARLY_STEPS,
     )

@@ -30,8 +30,8 @@ def train_novice() -> Callable[..., Policy]:
     """Train a policy for a few iterations only."""
 
     @cache
-    def train(problem: str = "right", seed: int = 0, named: str = "tuned") -> Policy:
-        return train_policy(recipe("ars", named, problem=problem, seed=seed, iterations=4)).policy
+    def train(problem: str = "right", seed: int = 0) -> Policy:
+        return train_policy(recipe("ars", "tuned", problem=problem, seed=seed, iterations=4)).policy
 
     return train
 
