@@ -3,13 +3,11 @@
 import json
 from dataclasses import dataclass, field
 from functools import partial
-from pathlib import Path
 from typing import Any, ClassVar
 
 from kinarm._command_line import run_request
 from kinarm._console import open_console
 from kinarm._fields import Checked
-from kinarm._files import check_folder, only_writer, write_text
 from kinarm.evaluation.report.templating import template_environment
 
 
@@ -25,8 +23,6 @@ class BenchmarkRequest(Checked):
         Trained policy to run, on the problem that it is for.
     ppo : bool
         Time a training with PPO as well, a minute or two.
-    out : Path
-        Output folder, for a document and a page.
     json : bool
         Print JSON on standard output.
     """
@@ -36,32 +32,19 @@ class BenchmarkRequest(Checked):
         default="ars-tuned-both", metadata={"metavar": "NAME_OR_FILE", "bare": True}
     )
     ppo: bool = False
-    out: Path | None = field(default=None, metadata={"metavar": "DIR"})
     json: bool = False
 
-    GROUPS: ClassVar = {"what is measured": "repetitions policy ppo", "output": "out json"}
-    DEFAULTS: ClassVar = {"out": "a table on standard output alone"}
+    GROUPS: ClassVar = {"what is measured": "repetitions policy ppo", "output": "json"}
 
-    def run(self, command: str | None = None) -> dict[str, Any]:
-        """Measure everything, and write ``speed.json`` and ``SPEED.md`` to a folder, if any.
-
-        ``command`` is recorded, by default this request.
-        """
+    def run(self) -> dict[str, Any]:
+        """Measure everything."""
         from kinarm.evaluation.bench import measure
 
-        if self.out is None:
-            return measure(self.policy, self.repetitions, ppo=self.ppo)
-        check_folder(self.out)
-        with only_writer(self.out):
-            measured = measure(self.policy, self.repetitions, ppo=self.ppo)
-            document = {"command": command or repr(self), **measured}
-            write_text(self.out / "speed.json", json.dumps(document, indent=1) + "\n")
-            write_text(self.out / "SPEED.md", speed_page(document))
-        return document
+        return measure(self.policy, self.repetitions, ppo=self.ppo)
 
 
 def speed_page(document: dict[str, Any]) -> str:
-    """``SPEED.md``: everything that was measured, in one table."""
+    """Everything that was measured, in one table of Markdown."""
     return template_environment().get_template("speed.md").render({"ppo_training": {}, **document})
 
 
@@ -69,11 +52,11 @@ def _report(request: BenchmarkRequest, command: str) -> None:
     """Run a request, and print its figures."""
     from rich.markdown import Markdown
 
-    document = request.run(command)
+    document = {"command": command, **request.run()}
     if request.json:
         print(json.dumps(document))
         return
-    _, _, page = speed_page({"command": command, **document}).partition("\n\n")
+    _, _, page = speed_page(document).partition("\n\n")
     open_console().print(Markdown(page))
 
 

@@ -27,7 +27,7 @@ def test_nothing_is_lost_or_left(disturb, command, count):
     assert sum(tally.counts.values()) >= count
 
 
-@pytest.mark.parametrize("command", [EVALUATED, STUDIED, "kinarm-bench --out out"])
+@pytest.mark.parametrize("command", [EVALUATED, STUDIED])
 def test_one_process_at_a_time_writes_to_a_folder(command, tmp_path):
     (tmp_path / "out").mkdir()
     with only_writer(tmp_path / "out"), started(command, tmp_path) as process:
