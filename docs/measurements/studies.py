@@ -61,7 +61,7 @@ def main() -> None:
         seconds = time.perf_counter() - began
         print(f"trainings planned: {len(planned) / seconds:,.0f} a second")
         began = time.perf_counter()
-        loaded = len(Study.load(short.store.folder).table())
+        loaded = len(Study.load(short.store.folder).rows())
         size = sum(short.store.path("runs", run).stat().st_size for run in short.runs) / most
         seconds = time.perf_counter() - began
         print(f"reading {loaded} trainings of {size / 1e3:.0f} kB each: {seconds:.2f} s")

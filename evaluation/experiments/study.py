@@ -10,7 +10,6 @@ from threading import Event, Thread
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from kinarm._console import ProgressLine
 from kinarm._files import absolute, is_being_written
@@ -320,15 +319,3 @@ class Study:
                 }
             )
         return rows
-
-    def table(self) -> NDArray[Any]:
-        """The `rows` as a structured array of numbers and texts."""
-        rows = self.rows()
-        columns = {}
-        for name in rows[0] if rows else ():
-            values = [row[name] for row in rows]
-            if not all(isinstance(each, bool | int | float) for each in values):
-                values = ["" if each is None else shown(each) for each in values]
-            columns[name] = np.array(values)
-        kinds = [(name, column.dtype) for name, column in columns.items()]
-        return np.array([*zip(*columns.values(), strict=True)], dtype=kinds)

@@ -127,7 +127,7 @@ def _bounds_samples() -> list[bytes]:
 def _study(path: Path) -> None:
     """Read everything that lies in the folder of a study."""
     study = Study(samples.SMALL_STUDY, path.parents[1])
-    study.table()
+    study.rows()
     study.store.made(study.runs[0])
     assert len(study.bounds) <= 1
 
