@@ -1,5 +1,6 @@
 """An evaluation, from the request to the files."""
 
+import json
 from collections.abc import Callable
 from contextlib import ExitStack
 from dataclasses import dataclass, field
@@ -214,9 +215,7 @@ class EvaluationRequest(ProblemOptions, TableOptions):
 
             self.write_csv(all_columns(), every_row(document))
         if self.out is not None:
-            from kinarm.evaluation.schemas import document_text
-
-            write_text(self.out / DOCUMENT, document_text(document.to_json()))
+            write_text(self.out / DOCUMENT, json.dumps(document.to_json(), indent=1) + "\n")
 
     def _checked_pairs(self) -> "list[Pair]":
         """Who faces which problem, after checks of policies and files."""
