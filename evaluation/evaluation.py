@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Any
 
 import msgspec
 import numpy as np
-from numpy.typing import NDArray
 
 from kinarm.episodes import Outcome, Rollouts
 from kinarm.errors import InvalidInputError
@@ -70,11 +69,6 @@ class Evaluation:
         """Share of trials that ended within the tolerance, without contact."""
         return Estimate.share(self.rollouts.success)
 
-    @property
-    def collision(self) -> Estimate:
-        """Share of trials that ended in contact."""
-        return Estimate.share(self.rollouts.collision)
-
     def within(self, distance: float) -> Estimate:
         """Share of trials whose final distance is at most ``distance`` [m]."""
         return Estimate.share(self.rollouts.distance <= distance)
@@ -108,11 +102,6 @@ class Evaluation:
         return estimate_metrics(outcomes_of(self.members), outcomes_of(other.members))
 
     @property
-    def step_ratio(self) -> NDArray[np.float64]:
-        """Steps taken over those proven necessary, of successful trials."""
-        return outcomes_of((self,)).step_ratio
-
-    @property
     def outcomes(self) -> tuple[Outcome, ...]:
         """``"success"``, ``"collision"`` or ``"truncated"``, per trial."""
         return self.rollouts.outcomes
@@ -143,10 +132,6 @@ class Evaluation:
             outcomes=ends,
             held=held or msgspec.UNSET,
         )
-
-    def to_json(self) -> dict[str, Any]:
-        """Figures of merit and every trial as JSON holds them."""
-        return self.result.to_json()
 
     def __repr__(self) -> str:
         name, problem = self.name, self.problem.name

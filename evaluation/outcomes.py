@@ -116,7 +116,6 @@ class Outcomes:
 
     distance = _joined("rollouts", "distance", "Final distances [m].")
     steps = _joined("rollouts", "steps", "Steps taken.")
-    returns = _joined("rollouts", "returns", "Sums of rewards.")
     success = _joined("rollouts", "success", "Whether a trial ended in success.")
     collision = _joined("rollouts", "collision", "Whether a trial ended in contact.")
     turn = _joined("rollouts", "turn", "Final errors of the goals' rests; empty if they have none.")

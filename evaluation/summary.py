@@ -3,7 +3,6 @@
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 
@@ -78,10 +77,6 @@ class PooledEvaluation:
                 success=worst.success,
             ),
         )
-
-    def to_json(self) -> dict[str, Any]:
-        """Figures of merit as JSON holds them."""
-        return self.result.to_json()
 
     def __repr__(self) -> str:
         seeds, trials = len(self.members), self.members[0].trials

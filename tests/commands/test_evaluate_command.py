@@ -21,7 +21,7 @@ def test_json_alone_is_printed_and_equals_the_library(evaluated, policy_folder):
         evaluate(contestant, "right", trials=9, seed=4, oracle=True)
         for contestant in (policy_folder / "mine-seed0.npz", "oracle")
     )
-    assert document["results"] == [expected.to_json(), oracle.to_json()]
+    assert document["results"] == [expected.result.to_json(), oracle.result.to_json()]
     entry = document["protocol"]["problems"]["right"]
     assert entry["oracle"] == bounds_document(expected.bounds).to_json()
     assert entry["trial_set_hash"] == expected.trials.digest

@@ -32,7 +32,7 @@ def test_episodes_are_those_of_the_reference(skilled, skilled_evaluation, monkey
 def test_figures_are_those_of_the_episodes(skilled_evaluation):
     distance = np.array(skilled_evaluation.rollouts.distance)
     outcomes = skilled_evaluation.outcomes
-    document = skilled_evaluation.to_json()
+    document = skilled_evaluation.result.to_json()
     figures = {name: entry["value"] for name, entry in document["metrics"].items()}
     assert document["trials"] == 60
     assert figures["success"] == outcomes.count("success") / 60
@@ -120,7 +120,7 @@ def test_pooling_keeps_problems_apart(skilled):
 
 def test_pooled_figures_are_those_of_all_seeds(evaluations):
     members = evaluations[:3]
-    document = pool(evaluations)[0].to_json()
+    document = pool(evaluations)[0].result.to_json()
     figures = {name: entry["value"] for name, entry in document["metrics"].items()}
     distance = np.concatenate([member.rollouts.distance for member in members])
     steps = np.concatenate([member.rollouts.steps for member in members])
@@ -138,7 +138,7 @@ def test_pooled_spread_is_over_the_seeds(evaluations):
     pooled = pool(evaluations)[0]
     rates = [member.success.value for member in evaluations[:3]]
     medians = [sorted(member.rollouts.distance)[29:31] for member in evaluations[:3]]
-    spread = pooled.to_json()["spread"]
+    spread = pooled.result.to_json()["spread"]
     assert spread["success"]["each"] == rates
     assert (spread["success"]["min"], spread["success"]["max"]) == (min(rates), max(rates))
     mean = sum(rates) / 3
@@ -150,7 +150,7 @@ def test_pooled_spread_is_over_the_seeds(evaluations):
 
 def test_pooled_interval_is_no_narrower_than_its_trials_allow(evaluations):
     """60 trials with the pooled rate have a Wilson interval at least this wide."""
-    success = pool(evaluations)[0].to_json()["metrics"]["success"]
+    success = pool(evaluations)[0].result.to_json()["metrics"]["success"]
     p, z, n = success["value"], 1.959963984540054, 60
     half = z * (p * (1 - p) / n + z**2 / (4 * n**2)) ** 0.5 / (1 + z**2 / n)
     assert success["ci95"][1] - success["ci95"][0] >= 2 * half - 1e-12

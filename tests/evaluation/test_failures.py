@@ -30,20 +30,20 @@ def told(row):
 
 
 def test_failures_are_counted_by_cause(evaluations):
-    rows = [evaluation.to_json() for evaluation in evaluations]
+    rows = [evaluation.result.to_json() for evaluation in evaluations]
     for row in rows:
         assert told(row) == dict(counted([row]))
         numbers = [each["trials"] for each in row["failures"]]
         assert numbers == sorted(numbers, reverse=True)
         shares = [each["share_of_failures"] for each in row["failures"]]
         assert sum(shares) == pytest.approx(float(bool(shares)))
-    pooled = pool(evaluations)[0].to_json()
+    pooled = pool(evaluations)[0].result.to_json()
     assert told(pooled) == dict(counted(rows[:3]))
 
 
 def test_shares_of_trials_are_those_of_the_causes(evaluations):
     for evaluation in evaluations:
-        row, metrics = evaluation.to_json(), evaluation.metrics
+        row, metrics = evaluation.result.to_json(), evaluation.metrics
         early = sum(each["trials"] for each in row["failures"] if each["early"])
         assert metrics["early_collision"].value == early / row["trials"]
         late = metrics["collision"].value - metrics["early_collision"].value

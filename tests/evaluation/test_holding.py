@@ -61,7 +61,7 @@ def test_figures_are_shares_without_contact(skilled, trials, stepped):
 
 def test_what_ends_at_success_stays_as_it_was(skilled, trials, skilled_evaluation):
     evaluation = run_trials(Contestant.from_policy("skilled", skilled), trials, hold=True)
-    rows = [each.to_json() for each in (skilled_evaluation, evaluation)]
+    rows = [each.result.to_json() for each in (skilled_evaluation, evaluation)]
     for name, estimate in rows[0]["metrics"].items():
         if estimate["value"] is not None:
             assert rows[1]["metrics"][name] == estimate
