@@ -1,6 +1,5 @@
 """Executors of a cluster: Ray, and array jobs of Slurm."""
 
-import hashlib
 import os
 import pickle
 import socket
@@ -8,8 +7,7 @@ import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
-from functools import cache, partial
-from importlib import import_module
+from functools import partial
 from itertools import islice
 from pathlib import Path
 from typing import Any
@@ -19,34 +17,28 @@ from kinarm._interrupts import kept_from_children
 from kinarm.errors import InvalidInputError, WorkerError, needed
 from kinarm.evaluation.experiments.executors import Failure, attempt
 from kinarm.policies.oracle import ORACLE_SEMANTICS
-from kinarm.policies.provenance import package_versions
-
-PACKAGES = ("kinarm", "kinarm.policies", "kinarm.evaluation", "kinarm.data")
-"""All of kinarm; in a clone beside each other, else in the first."""
+from kinarm.policies.provenance import package_versions, source_commit
 
 
-@cache
 def identity() -> dict[str, str]:
-    """Versions of packages and of results, and the hash of kinarm's source."""
-    files = {
-        f"{package}.{'.'.join(path.relative_to(folder).parts)}": path
-        for package in PACKAGES
-        for folder in import_module(package).__path__[:1]
-        for path in Path(folder).rglob("*.py")
+    """Versions of packages and of results, and the commit of kinarm's clone, if there is one."""
+    return {
+        **package_versions(),
+        "semantics": SEMANTICS,
+        "oracle semantics": ORACLE_SEMANTICS,
+        "commit of kinarm": source_commit(),
     }
-    source = hashlib.sha256(b"".join(files[name].read_bytes() for name in sorted(files)))
-    results = {"semantics": SEMANTICS, "oracle semantics": ORACLE_SEMANTICS}
-    return {**package_versions(), **results, "source of kinarm": source.hexdigest()[:12]}
 
 
 def _do_alike(work: Callable[[Any], Any], expected: Mapping[str, str], task: Any) -> Any:
     """Do the work for a task if the driver's `identity` is the one here.
 
-    Else a `WorkerError` names the first difference.
+    Else a `WorkerError` names the first difference. A commit is compared where both know theirs.
     """
     here = identity()
     for name, wanted in expected.items():
-        if (found := here.get(name, "not installed")) != wanted:
+        found = here.get(name, "not installed")
+        if found and wanted and found != wanted:
             raise WorkerError(
                 f"a worker differs from this process: {name} is {found} there, {wanted} here"
             )
