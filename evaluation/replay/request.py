@@ -31,8 +31,8 @@ ALTERNATIVES = ("policy compare", "trial worst collisions failures")
 """Fields that exclude each other."""
 
 NOT_LIVE = "source compare trial worst collisions failures trials out record"
-NOT_FROM_FILE = f"{ProblemOptions.CHANGES.removeprefix('arm ')} seed trials"
-"""Fields without meaning for the live page, and for trials from a file."""
+NOT_RECORDED = f"{ProblemOptions.CHANGES.removeprefix('arm ')} seed trials vec_normalize wrapper"
+"""Fields without meaning for the live page, and for a file of recordings."""
 
 PAGE, PLAYGROUND = "replay.html", "play.html"
 """Default pages."""
@@ -48,8 +48,7 @@ class ReplayRequest(ProblemOptions):
     Parameters
     ----------
     source : Path
-        File to take trials from, evaluation.json of kinarm-eval or recordings
-        (.npz); or a policy, as for --policy.
+        File of recordings (.npz); or a policy, as for --policy.
     policy : str
         Shipped policy or recipe (its first seed), best, random, zero, oracle,
         .npz file, folder of them (the first), Stable-Baselines3's model.zip
@@ -164,11 +163,7 @@ class ReplayRequest(ProblemOptions):
             raise InvalidInputError("--port goes with --live")
         self._refuse("--play", NOT_PLAYED if self.play is not None else "")
         self._refuse("--live", NOT_LIVE if self.live else "")
-        self._refuse("trials from a file", NOT_FROM_FILE if self.source else "")
-        if self.source is not None and self.source.suffix == ".json":
-            self._refuse("trials of an evaluation", "arm")
-        elif self.source is not None:
-            self._refuse("a file of recordings", "vec_normalize wrapper")
+        self._refuse("a file of recordings", NOT_RECORDED if self.source else "")
 
     def _refuse(self, mode: str, names: str) -> None:
         for option in self._given(names):
@@ -287,9 +282,9 @@ class ReplayRequest(ProblemOptions):
 
 
 def is_policy(source: Path) -> bool:
-    """Whether it is no file of trials: a policy file, or what else names a policy."""
+    """Whether it is no file of recordings: a policy file, or what else names a policy."""
     if source.suffix != ".npz":
-        return source.suffix != ".json"
+        return True
     with suppress(Exception), np.load(source, allow_pickle=False) as content:
         return str(content["format"]) == "kinarm-policy"
     return False

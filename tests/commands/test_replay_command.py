@@ -1,6 +1,5 @@
-"""``kinarm-replay``: pages from policies, evaluations and recordings, and a live one."""
+"""``kinarm-replay``: pages from policies and recordings, and a live one."""
 
-import json
 from dataclasses import replace as changed_to
 
 import numpy as np
@@ -17,6 +16,8 @@ from kinarm.problem import ReachProblem
 from kinarm.recording import load_recordings, save_recordings
 
 QUICK = ("--no-oracle",)
+EVALUATED = ("--problem", "right", "--trials", 12, "--seed", 4)
+"""The trials of the fixture ``evaluation``."""
 
 
 def played(answer):
@@ -34,10 +35,9 @@ def test_trials_of_a_policy(replay, policy_folder, tmp_path):
 
 
 def test_recordings_end_as_the_evaluation_says(run, tmp_path, evaluation, policy_folder):
-    options = ("--policy", policy_folder / "mine-seed0.npz", "--problem", "right")
-    settings = ("--trials", 12, "--seed", 4, *QUICK)
+    options = ("--policy", policy_folder / "mine-seed0.npz", *EVALUATED, *QUICK)
     files = ("--out", tmp_path / "made.html", "--record", tmp_path / "made.npz")
-    assert run("kinarm-replay", *options, *settings, *files).status == 0
+    assert run("kinarm-replay", *options, *files).status == 0
     said = outcomes_of(evaluation, "mine-seed0")
     recorded = load_recordings(tmp_path / "made.npz")
     assert [each.final_distance for each in recorded] == said["final_distance"]
@@ -49,7 +49,7 @@ def test_recordings_end_as_the_evaluation_says(run, tmp_path, evaluation, policy
 
 def test_the_worst_of_an_evaluation(replay, evaluation):
     distances = np.array(outcomes_of(evaluation, "random")["final_distance"])
-    answer = replay(evaluation, "--policy", "random", "--worst", 3, *QUICK)
+    answer = replay("random", *EVALUATED, "--worst", 3, *QUICK)
     assert played(answer) == np.argsort(-distances, kind="stable")[:3].tolist()
 
 
@@ -64,7 +64,7 @@ def test_the_collisions_of_an_evaluation(replay, evaluation):
     ends = outcomes_of(evaluation, "random")["outcome"]
     expected = [number for number, end in enumerate(ends) if end == "collision"]
     assert expected
-    answer = replay(evaluation, "--policy", "random", "--collisions", *QUICK)
+    answer = replay("random", *EVALUATED, "--collisions", *QUICK)
     assert played(answer) == expected
     assert answer.out.count(" touches ") == len(expected)
 
@@ -132,7 +132,7 @@ def test_a_page_of_kinarm_with_the_default_name_is_replaced(run, tmp_path, monke
     check_refused(run("kinarm-replay", *options), "--overwrite")
 
 
-def test_a_policy_needs_no_option(run, replay, policy_folder, evaluation, tmp_path):
+def test_a_policy_needs_no_option(run, replay, policy_folder, tmp_path):
     mine, few = policy_folder / "mine-seed0.npz", ("--trials", 1, *QUICK)
     for number, words in enumerate([("--policy", mine, *few), (mine, *few), (*few, mine)]):
         assert run("kinarm-replay", *words, "--out", tmp_path / f"{number}.html").status == 0
@@ -165,27 +165,6 @@ def test_recordings_are_compared_in_the_same_trials_only(replay, recordings, tmp
     check_refused(replay(mixed, "--compare", "mine-seed0", "other"), "cannot be compared")
     save_recordings(mixed, [first, changed_to(first, policy="other")])
     assert played(replay(mixed, "--compare", "mine-seed0", "other")) == [0, 0]
-
-
-@pytest.mark.parametrize(
-    ("change", "told"),
-    [
-        (lambda d: d["protocol"]["problems"]["right"]["goals"].reverse(), "hash"),
-        (lambda d: d["results"][1]["outcomes"]["steps"].reverse(), "ends otherwise"),
-    ],
-)
-def test_an_evaluation_that_no_longer_holds(replay, evaluation, tmp_path, change, told):
-    document = json.loads(evaluation.read_text())
-    assert document["results"][1]["policy"] == "random"
-    change(document)
-    (tmp_path / "evaluation.json").write_text(json.dumps(document))
-    check_refused(replay(tmp_path / "evaluation.json", "--policy", "random", *QUICK), told)
-
-
-def test_an_evaluation_of_several_policies(replay, evaluation):
-    check_refused(replay(evaluation, "--policy", "nobody"), "'nobody'", "random")
-    check_refused(replay(evaluation, "--policy", "mine-seed0"), "is a file: name it with --policy")
-    check_refused(replay(evaluation, "--policy", "random", "--problem", "left"), "'random'")
 
 
 class TestPlayground:
