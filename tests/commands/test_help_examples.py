@@ -14,6 +14,7 @@ SMALLER = {
     "kinarm-eval": ("--trials", 5, "--no-oracle"),
     "kinarm-train ppo": ("--iterations", 1, "--n-envs", 8, "--batch-size", 64),
     "kinarm-train": ("--iterations", 2),
+    "kinarm-replay --play": ("--overwrite",),
     "kinarm-replay": ("--no-oracle", "--overwrite"),
     "kinarm-problem check": ("--trials", 4),
 }
@@ -30,13 +31,12 @@ ELSEWHERE = (
     " status ",
     "my_module:LEARNER",
     "model.zip",
-    "--live",
     "my.urdf",
     "ur5",
     "--address",
     ">",
 )
-"""Parts of examples that need what is not there, or a shell, or never end."""
+"""Parts of examples that need what is not there, or a shell."""
 
 
 class AcceptedError(Exception):

@@ -1,4 +1,4 @@
-"""``kinarm-replay``: pages from policies and recordings, and a live one."""
+"""``kinarm-replay``: pages from policies and recordings."""
 
 from dataclasses import replace as changed_to
 
@@ -96,8 +96,6 @@ def test_two_policies_on_the_same_trials(replay, tmp_path):
         (("--policy", "zero", "--worst", "3", "--collisions"), ["--worst", "--collisions"]),
         (("--policy", "zero", "--problem", "left", "--trial", "200"), ["no trial 200", "0 to 199"]),
         (("--policy", "zero", "--problem", "left", "--collisions"), ["none of the 200 trials"]),
-        (("--policy", "zero", "--problem", "left", "--port", "7001"), ["--live"]),
-        (("--policy", "zero", "--problem", "left", "--live"), ["--out", "--live"]),
         (("--policy", "oracle", "--problem", "left", "--failures", "--trials", "9"), ["none of"]),
         (("--policy", "zero", "--problem", "left", "--failures"), ["10000 of 10000", "--trials"]),
         (("missing.npz",), ["missing.npz", "No such file"]),
@@ -188,7 +186,6 @@ class TestPlayground:
             (("nobody",), "unknown policy 'nobody'"),
             ((PLAYED[0], "--compare", "zero", "zero"), "--compare does not go with --play"),
             ((PLAYED[0], "--wrapper", "a:b"), "--wrapper does not go with --play"),
-            ((PLAYED[0], "--live"), "--live does not go with --play"),
             ((PLAYED[0], "--plant", "hard"), "it has a plant with more than one delay"),
             ((PLAYED[0], "--arm", "paper_flange"), "was trained for arm 'paper', not for"),
         ],
