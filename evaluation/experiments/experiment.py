@@ -23,11 +23,8 @@ RANGE = ("low", "high", "log")
 TABLES = ("fixed", "grid", "search")
 """Entries of a file that name fields of settings."""
 
-SEARCH_CHOICES = {
-    "sampler": {"tpe": "TPESampler", "random": "RandomSampler", "cmaes": "CmaEsSampler"},
-    "pruner": {"median": "MedianPruner", "none": "NopPruner", "hyperband": "HyperbandPruner"},
-}
-"""Choices of a search and Optuna's names of them, the defaults first."""
+SAMPLERS = {"tpe": "TPESampler", "random": "RandomSampler", "cmaes": "CmaEsSampler"}
+"""Samplers of a search and Optuna's names of them, the default first."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -107,8 +104,7 @@ class Experiment(Checked):
     search : dict
         ``count`` combinations that Optuna proposes, by ``seed`` (0) and
         ``sampler`` (tpe), of fields with a list of values, or a table of
-        ``low``, ``high`` and, for an even logarithm, ``log = true``;
-        ``pruner`` (median) breaks trainings off.
+        ``low``, ``high`` and, for an even logarithm, ``log = true``.
     """
 
     name: str
@@ -145,11 +141,10 @@ class Experiment(Checked):
             raise InvalidInputError(
                 f"a search has one learner and one recipe, got {len(self.all_entries)} of both"
             )
-        for name, known in SEARCH_CHOICES.items():
-            if name in self.search and self.search[name] not in known:
-                raise InvalidInputError(
-                    f"search.{name} must be one of {', '.join(known)}, got {self.search[name]!r}"
-                )
+        if (sampler := self.search.get("sampler", "tpe")) not in SAMPLERS:
+            raise InvalidInputError(
+                f"search.sampler must be one of {', '.join(SAMPLERS)}, got {sampler!r}"
+            )
         if not self.searched:
             raise InvalidInputError("search names no field")
         for key in self.searched:
@@ -167,7 +162,7 @@ class Experiment(Checked):
     @property
     def searched(self) -> dict[str, Any]:
         """Lists and ranges that are searched, by field."""
-        said = ("count", "seed", *SEARCH_CHOICES)
+        said = ("count", "seed", "sampler")
         return {key: entry for key, entry in self.search.items() if key not in said}
 
     def to_json(self) -> dict[str, Any]:
