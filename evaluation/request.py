@@ -89,6 +89,8 @@ class EvaluationRequest(ProblemOptions, TableOptions):
         Print the JSON document alone on standard output.
     markdown : bool
         Print the table as Markdown.
+    overwrite : bool
+        Replace earlier results.
 
     Raises
     ------
@@ -126,13 +128,14 @@ class EvaluationRequest(ProblemOptions, TableOptions):
     card: Path | None = None
     json: bool = False
     markdown: bool = False
+    overwrite: bool = False
 
     GROUPS: ClassVar = {
         "what is evaluated": (
             "policies against problems vec_normalize wrapper shield matrix allow_other_arm"
         ),
         "trials": "trials seed oracle hold",
-        "table": "columns csv markdown json",
+        "table": "columns markdown json",
         "output": "out report card overwrite",
         "changes to the problems": ProblemOptions.CHANGES.replace("shield ", ""),
     }
@@ -147,9 +150,8 @@ class EvaluationRequest(ProblemOptions, TableOptions):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        alone = (("--json", self.json), ("--markdown", self.markdown), ("--csv -", self.prints_csv))
-        if len(given := [option for option, is_given in alone if is_given]) > 1:
-            raise InvalidInputError(f"{given[0]} and {given[1]} exclude each other")
+        if self.json and self.markdown:
+            raise InvalidInputError("--json and --markdown exclude each other")
         if self.json and self.columns:
             raise InvalidInputError("--columns is for tables, and --json prints the whole document")
 
@@ -230,10 +232,6 @@ class EvaluationRequest(ProblemOptions, TableOptions):
 
             tell("writing the card")
             write_card(self.card, document, evaluations)
-        if self.csv is not None:
-            from kinarm.evaluation.table import all_columns, every_row
-
-            self.write_csv(all_columns(), every_row(document))
         if self.out is not None:
             from kinarm.evaluation.schemas import document_text
 
@@ -243,10 +241,10 @@ class EvaluationRequest(ProblemOptions, TableOptions):
         """Who faces which problem, after checks of policies and files."""
         from kinarm.evaluation.selection import check_reference, select_pairs
 
-        if self.columns or self.csv:
+        if self.columns:
             from kinarm.evaluation.table import all_columns
 
-            self.check_table(all_columns())
+            self.chosen(all_columns())
         pairs = select_pairs(self)
         if self.against:
             check_reference(pairs, self.against)
