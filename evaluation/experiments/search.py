@@ -111,8 +111,8 @@ def _try_settings(
         else:
             shares = [float(found[run].outcomes.success.mean()) for run in each]
             search.tell(trial, float(np.mean(shares)))
-    for trial, error in errors.items():
-        trial.set_user_attr("error", error)
+    for trial, why in errors.items():
+        trial.set_user_attr("error", why)
         search.tell(trial, state=TrialState.FAIL)
     return len(errors)
 
