@@ -47,7 +47,7 @@ EVALUATED = (
     "kinarm-eval --policy ars-tuned-both-seed0 --problem right --no-oracle --trials 20 --out out"
 )
 REPLAYED = "kinarm-replay --policy ars-tuned-both-seed0 --trials 3 --out r.html --record r.npz"
-CHECKED = "kinarm-problem check right --trials 20 --picture p.png --json p.json"
+CHECKED = "kinarm-problem check right --trials 20 --picture p.png"
 SHOWN = "kinarm-arms show paper --out arm.html"
 SHORT = TRAIN.replace("1500", "3")
 
