@@ -64,7 +64,6 @@ nitpick_ignore_regex = [
     (r"py:class", r".*\.[A-Z]\w*T"),  # type variables
     # Packages, the replay page's, and what the reference leaves out.
     (r"py:obj", r"kinarm\.(policies|evaluation|state|kernels\.\w+)"),
-    (r"py:obj", r"kinarm\.evaluation\.problem_check\.\w+"),
     # What only kernels look into.
     (r"py:class", r"kinarm\.(kernels\.session\.Session|episodes\.Rules|goals\.Goals)"),
     (r"py:class", r"kinarm\.collision\.Step"),

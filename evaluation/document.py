@@ -1,4 +1,4 @@
-"""The document of an evaluation, from which trials can be faced again."""
+"""The document of an evaluation."""
 
 import json
 from pathlib import Path
@@ -8,7 +8,7 @@ import msgspec
 
 from kinarm._files import reading
 from kinarm.episodes import Outcome
-from kinarm.errors import InvalidInputError, UnknownNameError, finite_array
+from kinarm.errors import InvalidInputError
 from kinarm.evaluation.bounds import Bounds, bounds_document
 from kinarm.evaluation.estimates import BOOTSTRAP_SEED, RESAMPLES
 from kinarm.evaluation.outcomes import Cause, Pair
@@ -17,7 +17,6 @@ from kinarm.evaluation.statistics import LEVEL, Estimate
 from kinarm.evaluation.trials import TrialSet
 from kinarm.policies.oracle.solutions import OracleSolutions
 from kinarm.problem import ReachProblem
-from kinarm.simulator import Simulator
 
 
 class Intervals(Document, frozen=True, kw_only=True):
@@ -256,41 +255,3 @@ class EvaluationDocument(Document, frozen=True, kw_only=True):
             raise InvalidInputError(
                 f"{str(path)!r} is not a complete kinarm evaluation of this version: {error}"
             ) from error
-
-    def result(self, policy: str | None, problem: str | None) -> Result:
-        """The result of a policy, or of a group's first seed, on a problem."""
-        fitting = [row for row in self.results if problem in (None, row.problem)]
-        if policy is None:
-            named = [row for row in fitting if row.trained_on is not None] or fitting
-            if len(named) != 1:
-                choices = ", ".join(f"{row.policy} on {row.problem}" for row in named)
-                raise InvalidInputError(
-                    "the evaluation holds several results, choose with --policy and --problem: "
-                    f"{choices or 'none on this problem'}"
-                )
-            return named[0]
-        firsts = {(row.policy, row.problem): row.members[0] for row in self.pooled}
-        for row in fitting:
-            if row.policy == firsts.get((policy, row.problem), policy):
-                return row
-        raise UnknownNameError("policy", policy, dict.fromkeys(row.policy for row in fitting))
-
-    def faced(self, problem: str) -> FacedProblem:
-        """Entry of the protocol about a problem."""
-        if problem not in self.protocol.problems:
-            raise UnknownNameError("problem", problem, self.protocol.problems)
-        return self.protocol.problems[problem]
-
-    def problem(self, name: str) -> ReachProblem:
-        """One of the problems that were faced."""
-        return ReachProblem.from_json(self.faced(name).problem, f"problem {name}")
-
-    def trials(self, problem: str) -> TrialSet:
-        """The trials of a problem; refused if their hash differs."""
-        faced, simulator = self.faced(problem), Simulator(self.problem(problem))
-        starts = finite_array("starts", faced.starts, (None, simulator.arm.n_joints))
-        goals = finite_array("goals", faced.goals, (len(starts), simulator.world.goal_width))
-        trials = TrialSet(simulator, self.protocol.seed, starts, goals)
-        if trials.digest != faced.trial_set_hash:
-            raise InvalidInputError(f"the trials of {problem} do not match their hash")
-        return trials

@@ -85,6 +85,8 @@ class EvaluationRequest(ProblemOptions, TableOptions):
         Print the JSON document alone on standard output.
     markdown : bool
         Print the table as Markdown.
+    overwrite : bool
+        Replace earlier results.
 
     Raises
     ------
@@ -118,13 +120,14 @@ class EvaluationRequest(ProblemOptions, TableOptions):
     report: Path | None = field(default=None, metadata={"metavar": "FOLDER"})
     json: bool = False
     markdown: bool = False
+    overwrite: bool = False
 
     GROUPS: ClassVar = {
         "what is evaluated": (
             "policies problems vec_normalize wrapper shield matrix allow_other_arm"
         ),
         "trials": "trials seed oracle hold",
-        "table": "columns csv markdown json",
+        "table": "columns markdown json",
         "output": "out report overwrite",
         "changes to the problems": ProblemOptions.CHANGES.replace("shield ", ""),
     }
@@ -138,9 +141,8 @@ class EvaluationRequest(ProblemOptions, TableOptions):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        alone = (("--json", self.json), ("--markdown", self.markdown), ("--csv -", self.prints_csv))
-        if len(given := [option for option, is_given in alone if is_given]) > 1:
-            raise InvalidInputError(f"{given[0]} and {given[1]} exclude each other")
+        if self.json and self.markdown:
+            raise InvalidInputError("--json and --markdown exclude each other")
         if self.json and self.columns:
             raise InvalidInputError("--columns is for tables, and --json prints the whole document")
 
@@ -210,10 +212,6 @@ class EvaluationRequest(ProblemOptions, TableOptions):
 
             tell("writing the report")
             write_report(self.report, document, evaluations)
-        if self.csv is not None:
-            from kinarm.evaluation.table import all_columns, every_row
-
-            self.write_csv(all_columns(), every_row(document))
         if self.out is not None:
             write_text(self.out / DOCUMENT, json.dumps(document.to_json(), indent=1) + "\n")
 
@@ -221,10 +219,10 @@ class EvaluationRequest(ProblemOptions, TableOptions):
         """Who faces which problem, after checks of policies and files."""
         from kinarm.evaluation.selection import select_pairs
 
-        if self.columns or self.csv:
+        if self.columns:
             from kinarm.evaluation.table import all_columns
 
-            self.check_table(all_columns())
+            self.chosen(all_columns())
         pairs = select_pairs(self)
         problems = {problem.name: problem for _, problem in pairs}
         arms = {name: problem.load_arm() for name, problem in problems.items()}

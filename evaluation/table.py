@@ -1,4 +1,4 @@
-"""The table of an evaluation, for terminals, Markdown, CSV and reports."""
+"""The table of an evaluation, for terminals, Markdown and reports."""
 
 from collections.abc import Callable, Collection, Mapping, Sequence
 from operator import attrgetter
@@ -45,20 +45,7 @@ def metric_column(name: str, estimates: Callable[[T], Mapping[str, Estimate]]) -
 
     heading = metric.heading or f"{name.replace('_', ' ')} {metric.unit}".rstrip()
     priority = metric.priority if metric.heading else ON_REQUEST
-    return Column(
-        heading,
-        cell,
-        name,
-        metric.meaning,
-        priority,
-        lambda row: raw_estimate(name, estimates(row)[name]),
-    )
-
-
-def raw_estimate(name: str, estimate: Estimate) -> dict[str, float | None]:
-    """An estimate and the ends of its interval, as columns of CSV files."""
-    ends = zip((f"{name}_low", f"{name}_high"), estimate.ci95 or (), strict=False)
-    return {name: estimate.value, **dict(ends)}
+    return Column(heading, cell, name, metric.meaning, priority)
 
 
 def difference_cell(name: str, difference: Estimate) -> Cell:
@@ -96,17 +83,13 @@ def spread_column(name: str) -> Column[Row]:
     """The column of a metric's range over training seeds; empty without seeds."""
     metric = METRICS[name]
 
-    def values(row: Row) -> dict[str, float]:
-        if not isinstance(row, PooledResult) or name not in row.spread:
-            return {}
-        return {f"{name}_min": row.spread[name].min, f"{name}_max": row.spread[name].max}
-
     def cell(row: Row) -> Cell:
-        ends = values(row).values()
-        return Cell(metric.write_range(*ends)) if ends else Cell()
+        if not isinstance(row, PooledResult) or name not in row.spread:
+            return Cell()
+        return Cell(metric.write_range(row.spread[name].min, row.spread[name].max))
 
     meaning = f"range over training seeds: {metric.meaning}"
-    return Column(metric.spread_heading, cell, f"{name}_range", meaning, SPREAD_PRIORITY, values)
+    return Column(metric.spread_heading, cell, f"{name}_range", meaning, SPREAD_PRIORITY)
 
 
 def all_columns() -> list[Column[Row]]:

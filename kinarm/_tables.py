@@ -1,18 +1,15 @@
-"""Tables of the commands: columns that fit, and the same as CSV."""
+"""Tables of the commands: columns that fit; and CSV files."""
 
 import csv
 import io
-import sys
 import textwrap
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from operator import itemgetter
-from pathlib import Path
 from typing import TYPE_CHECKING, Any, Generic, NamedTuple, TypeVar
 
 from kinarm._console import open_console
 from kinarm._fields import Checked
-from kinarm._files import check_output, write_text
 from kinarm.errors import UnknownNameError
 
 if TYPE_CHECKING:
@@ -43,8 +40,6 @@ class Column(Generic[T]):
         Text of a row.
     name, meaning : str
         Name for ``--columns``, by default the heading, and what it shows.
-    values : callable, optional
-        Values of a row for CSV files, by name; its text by default.
     priority : float
         Where space is scarce, columns of low priority are left out first.
     words : bool
@@ -56,7 +51,6 @@ class Column(Generic[T]):
     name: str = ""
     meaning: str = ""
     priority: float = 0
-    values: Callable[[T], Mapping[str, Any]] | None = None
     words: bool = False
 
     def __post_init__(self) -> None:
@@ -66,10 +60,6 @@ class Column(Generic[T]):
     def is_label(self) -> bool:
         """Whether it says what a row is about: words that are never left out."""
         return self.words and self.priority == ALWAYS
-
-    def raw(self, row: T) -> Mapping[str, Any]:
-        """Values of a row, by name."""
-        return {self.name: str(self.cell(row))} if self.values is None else self.values(row)
 
 
 def parse_columns(text: str) -> tuple[str, ...]:
@@ -84,30 +74,12 @@ class TableOptions(Checked):
     Parameters
     ----------
     columns : tuple of str
-        Names of the columns that are shown and written, such as
-        success,collision.
-    csv : Path
-        File for the table with raw values (.csv), or - to print it alone.
-    overwrite : bool
-        Replace earlier results.
+        Names of the columns that are shown, such as success,collision.
     """
 
     columns: tuple[str, ...] = field(
         default=(), metadata={"parse": parse_columns, "metavar": "A,B,C"}
     )
-    csv: Path | None = field(default=None, metadata={"metavar": "FILE.csv"})
-    overwrite: bool = False
-
-    @property
-    def prints_csv(self) -> bool:
-        """Whether the table is printed as CSV."""
-        return self.csv == Path("-")
-
-    def check_table(self, known: Sequence[Column[T]]) -> None:
-        """Check names of columns and the CSV file, before any work."""
-        self.chosen(known)
-        if self.csv is not None and not self.prints_csv:
-            check_output(self.csv, overwrite=self.overwrite, suffix=".csv")
 
     def chosen(self, known: Sequence[Column[T]]) -> list[Column[T]]:
         """The labels, and the columns of given names; without names, all columns."""
@@ -118,15 +90,6 @@ class TableOptions(Checked):
         labels = (name for name, each in by_name.items() if each.is_label)
         names = dict.fromkeys((*labels, *self.columns)) if self.columns else by_name
         return [by_name[name] for name in names]
-
-    def write_csv(self, known: Sequence[Column[T]], rows: Sequence[T]) -> None:
-        """Write or print the table as CSV, if asked."""
-        columns = self.chosen(known)
-        values = ({k: v for c in columns for k, v in c.raw(row).items()} for row in rows)
-        if self.prints_csv:
-            sys.stdout.write(csv_text(list(values)))
-        elif self.csv is not None:
-            write_text(self.csv, csv_text(list(values)))
 
 
 def csv_text(rows: Sequence[Mapping[str, Any]]) -> str:

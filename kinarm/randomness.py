@@ -21,7 +21,6 @@ class Stream(StrEnum):
     PPO_LEARNER = "ppo learner"
     PPO_SCENARIOS = "ppo scenarios"
     REPLAY = "replay"
-    STUDY = "study"
     DEMONSTRATIONS = "demonstrations"
 
 

@@ -71,8 +71,7 @@ class TrainRequest(ProblemOptions):
         File of the policy, with learning curve and checkpoint beside it; with
         --seeds, folder of the policies.
     resume : bool
-        Go on from the checkpoint beside --out; with --seeds, with each
-        unfinished seed.
+        Go on from the checkpoint beside --out; --seeds does so without it.
     overwrite : bool
         Replace an earlier policy; with --resume, by that of the training that
         goes on.

@@ -20,7 +20,6 @@ def _report(request: EvaluationRequest, command: str) -> None:
         document = request.run(command, say)
     if request.json:
         print(json.dumps(document.to_json()))
-    if request.json or request.prints_csv:
         return
     console = open_console()
     columns = request.chosen(all_columns()) if request.columns else ()
@@ -29,7 +28,7 @@ def _report(request: EvaluationRequest, command: str) -> None:
         console.print(_footnote(document), style="dim")
         if not request.policies and all(row.trained_on is None for row in document.results):
             console.print("no shipped policy was trained for this", style="dim")
-    written = [f"{request.csv}"] if request.csv else []
+    written = []
     if request.out is not None:
         written.append(f"{request.out / DOCUMENT}")
     if request.report is not None:

@@ -1,6 +1,5 @@
 """``kinarm-problem``: list, show, check and import problems."""
 
-import json
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
@@ -8,7 +7,7 @@ from typing import TYPE_CHECKING, BinaryIO, ClassVar, cast
 
 from kinarm._command_line import Commands, run_commands
 from kinarm._console import working
-from kinarm._files import check_output, write_atomically, write_text
+from kinarm._files import check_output, write_atomically
 from kinarm._tables import print_table
 from kinarm.arm_specification import ArmSpecification, arm_names
 from kinarm.bodies import Point
@@ -63,46 +62,39 @@ class CheckRequest(ShowRequest):
         Seed of the trials.
     picture : Path
         Picture of arm and scene (.png), which needs the extra render.
-    json : Path
-        All findings, as JSON.
     overwrite : bool
-        Replace earlier files.
+        Replace an earlier picture.
     """
 
     trials: int = field(default=200, metadata=TRIALS)
     seed: int = field(default=0, metadata=FROM_ZERO)
     picture: Path | None = field(default=None, metadata={"metavar": "FILE.png"})
-    json: Path | None = field(default=None, metadata={"metavar": "FILE.json"})
     overwrite: bool = False
 
     GROUPS: ClassVar = {
         "what is checked": "trials seed",
-        "output": "picture json overwrite",
+        "output": "picture overwrite",
         **ProblemOptions.GROUPS,
     }
 
     def run(self) -> "ProblemCheck":
-        """Check the problem, and write the outputs."""
+        """Check the problem, and write the picture."""
         from kinarm.evaluation.problem_check import check_problem
         from kinarm.world import World
 
         problem = self.resolve()
-        for path, suffix in ((self.picture, ".png"), (self.json, ".json")):
-            if path is not None:
-                check_output(path, overwrite=self.overwrite, suffix=suffix)
+        if self.picture is not None:
+            check_output(self.picture, overwrite=self.overwrite, suffix=".png")
         say_choices([problem])
         if self.picture is not None:
             write_picture(self.picture, problem)
         with working("checking") as say:
-            check = check_problem(
+            return check_problem(
                 World(problem),
                 self.trials,
                 self.seed,
                 lambda done, total: say(f"{done} of {total} trials solved"),
             )
-        if self.json is not None:
-            write_text(self.json, json.dumps(check.to_json(), indent=1))
-        return check
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -169,9 +161,8 @@ def _check(request: CheckRequest) -> None:
     goals = " and ".join(problem.task.goal_regions)
     print(f"{problem.name}: arm {problem.arm.name}, goals {goals}")
     print(check)
-    for path in (request.json, request.picture):
-        if path is not None:
-            print(f"  written  {path}")
+    if request.picture is not None:
+        print(f"  written  {request.picture}")
 
 
 def _import(request: ImportRequest) -> None:

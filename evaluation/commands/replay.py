@@ -1,4 +1,4 @@
-"""``kinarm-replay``: watch trials in a browser, from one file or live."""
+"""``kinarm-replay``: watch trials in a browser, from one file."""
 
 from functools import partial
 

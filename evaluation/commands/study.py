@@ -116,7 +116,7 @@ class StudyRequest(RunningOptions, TableOptions):
 
     GROUPS: ClassVar = {
         "experiment": "experiment only problems seeds out train threads",
-        "table": "columns csv overwrite",
+        "table": "columns",
         **RunningOptions.GROUPS,
     }
     DEFAULTS: ClassVar = {
@@ -157,7 +157,7 @@ class StudyRequest(RunningOptions, TableOptions):
         from kinarm.evaluation.experiments.study import Study
         from kinarm.evaluation.experiments.table import COLUMNS
 
-        self.check_table(COLUMNS)
+        self.chosen(COLUMNS)
         experiment = Experiment.load(self.experiment).only(
             entries=self.only, problems=self.problems, seeds=self.seeds
         )
@@ -173,7 +173,6 @@ class StudyRequest(RunningOptions, TableOptions):
             if len(study):
                 with open_console(stderr=True).status(BOUNDING):
                     write_all(study, command or repr(self))
-                    self.write_csv(COLUMNS, study.best(len(study)))
             if failed:
                 raise failed
         return study
@@ -207,7 +206,7 @@ def _carry_out(request: StudyRequest, command: str) -> None:
     study = request.run(command=command)
     if not len(study):
         print("no training is finished")
-    elif not request.prints_csv:
+    else:
         print_columns(
             request.chosen(COLUMNS),
             [study.best(SHOWN)],
@@ -215,8 +214,6 @@ def _carry_out(request: StudyRequest, command: str) -> None:
             whole=bool(request.columns),
             advice=CHOOSE,
         )
-        if request.csv is not None:
-            print(f"written: {request.csv}")
         print(f"written: {request.folder / 'index.html'}, with tables and figures beside it")
 
 

@@ -80,9 +80,9 @@ class SeedsRequest(Checked):
     def run(self) -> "tuple[TrainedSeed, ...]":
         """Train, and write a policy and a learning curve for each seed.
 
-        Files are named as ``ars-tuned-both-seed0.npz``. With ``resume``,
-        finished seeds are left as they are, and the others go on or begin.
-        Unfinished ones lie in the folder ``.training``.
+        Files are named as ``ars-tuned-both-seed0.npz``. The same request again
+        leaves finished seeds as they are, and the others go on or begin: the
+        folder ``.training`` says how far all are.
 
         Raises
         ------

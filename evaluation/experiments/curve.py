@@ -176,17 +176,16 @@ class Curve:
             yield state
             began = time.perf_counter(), time.process_time()
 
-    def update(self, state: TrainingState) -> bool:
-        """Add a point and its time if one is due, and return whether it was."""
+    def update(self, state: TrainingState) -> None:
+        """Add a point and its time if one is due."""
         if not self._is_due(state):
-            return False
+            return
         policy, trials = state_policy(self._config, state), self._trials
         rollouts = trials.simulator.rollout(policy, trials.starts, trials.goals)
         self.points.append(CurvePoint.of(state, rollouts))
         self._times.append(tuple(self._spent.round(3).tolist()))
         if self._settings.curve is not None:
             self._distances.append(rollouts.distance.astype(np.float32))
-        return True
 
     def _is_due(self, state: TrainingState) -> bool:
         """Whether a new point of the curve is reached."""

@@ -20,14 +20,11 @@ SEVERAL = ("learners", "recipes", "problems")
 
 RANGE = ("low", "high", "log")
 
-TABLES = ("fixed", "grid", "random", "search")
+TABLES = ("fixed", "grid", "search")
 """Entries of a file that name fields of settings."""
 
-SEARCH_CHOICES = {
-    "sampler": {"tpe": "TPESampler", "random": "RandomSampler", "cmaes": "CmaEsSampler"},
-    "pruner": {"median": "MedianPruner", "none": "NopPruner", "hyperband": "HyperbandPruner"},
-}
-"""Choices of a search and Optuna's names of them, the defaults first."""
+SAMPLERS = {"tpe": "TPESampler", "random": "RandomSampler", "cmaes": "CmaEsSampler"}
+"""Samplers of a search and Optuna's names of them, the default first."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -104,14 +101,10 @@ class Experiment(Checked):
     fixed, grid : dict
         Fixed values of fields, and lists of values, of which all combinations
         are trained.
-    random : dict
-        ``count`` combinations, drawn by ``seed`` (0), of fields with a list of
-        values, or a table of ``low``, ``high`` and, for an even logarithm,
-        ``log = true``.
     search : dict
         ``count`` combinations that Optuna proposes, by ``seed`` (0) and
-        ``sampler`` (tpe), of fields as in ``random``; ``pruner`` (median)
-        breaks trainings off.
+        ``sampler`` (tpe), of fields with a list of values, or a table of
+        ``low``, ``high`` and, for an even logarithm, ``log = true``.
     """
 
     name: str
@@ -124,7 +117,6 @@ class Experiment(Checked):
     bounds: bool = field(default=True, metadata=OPTIONAL)
     fixed: dict[str, Any] = field(default_factory=dict, metadata=OPTIONAL)
     grid: dict[str, Any] = field(default_factory=dict, metadata=OPTIONAL)
-    random: dict[str, Any] = field(default_factory=dict, metadata=OPTIONAL)
     search: dict[str, Any] = field(default_factory=dict, metadata=OPTIONAL)
     entries: tuple[Entry, ...] = field(default=(), metadata=OPTIONAL)
 
@@ -135,29 +127,24 @@ class Experiment(Checked):
                 raise InvalidInputError(f"{name} must not be empty")
             _check_distinct(name, getattr(self, name))
         _check_distinct("entries", [entry.name for entry in self.entries])
-        random, search = ranges_of(self.random), self.searched
-        _check_tables(fixed=self.fixed, grid=self.grid, random=random, search=search)
-        for table in ("random", "search"):
-            if entries := getattr(self, table):
-                whole_number(f"{table}.count", entries.get("count", 0), 1, MOST_TRAININGS)
-                whole_number(f"{table}.seed", entries.get("seed", 0), 0)
+        _check_tables(fixed=self.fixed, grid=self.grid, search=self.searched)
         if self.search:
+            whole_number("search.count", self.search.get("count", 0), 1, MOST_TRAININGS)
+            whole_number("search.seed", self.search.get("seed", 0), 0)
             self._check_search()
 
     def _check_search(self) -> None:
         """Refuse what cannot be searched."""
-        for table in ("grid", "random"):
-            if getattr(self, table):
-                raise InvalidInputError(f"search and {table} exclude each other")
+        if self.grid:
+            raise InvalidInputError("search and grid exclude each other")
         if len(self.all_entries) > 1:
             raise InvalidInputError(
                 f"a search has one learner and one recipe, got {len(self.all_entries)} of both"
             )
-        for name, known in SEARCH_CHOICES.items():
-            if name in self.search and self.search[name] not in known:
-                raise InvalidInputError(
-                    f"search.{name} must be one of {', '.join(known)}, got {self.search[name]!r}"
-                )
+        if (sampler := self.search.get("sampler", "tpe")) not in SAMPLERS:
+            raise InvalidInputError(
+                f"search.sampler must be one of {', '.join(SAMPLERS)}, got {sampler!r}"
+            )
         if not self.searched:
             raise InvalidInputError("search names no field")
         for key in self.searched:
@@ -175,7 +162,8 @@ class Experiment(Checked):
     @property
     def searched(self) -> dict[str, Any]:
         """Lists and ranges that are searched, by field."""
-        return ranges_of(self.search)
+        said = ("count", "seed", "sampler")
+        return {key: entry for key, entry in self.search.items() if key not in said}
 
     def to_json(self) -> dict[str, Any]:
         """As a dictionary that TOML and JSON can hold."""
@@ -295,12 +283,6 @@ def _check_values(where: str, entry: Any, *, ranges: bool) -> None:
         )
 
 
-def ranges_of(entries: Mapping[str, Any]) -> dict[str, Any]:
-    """Lists and ranges by field, without the other entries."""
-    said = ("count", "seed", *SEARCH_CHOICES)
-    return {key: entry for key, entry in entries.items() if key not in said}
-
-
 def _prepared(entries: Mapping[str, Any], several: Iterable[str]) -> dict[str, Any]:
     """Entries of a file, with lists for texts, and nested tables flattened."""
     made = dict(entries)
@@ -312,7 +294,7 @@ def _prepared(entries: Mapping[str, Any], several: Iterable[str]) -> dict[str, A
             made[name] = [made[name]]
     for table in TABLES:
         if isinstance(made.get(table), Mapping):
-            made[table] = dict(_flattened(made[table], table in ("random", "search")))
+            made[table] = dict(_flattened(made[table], table == "search"))
     return made
 
 

@@ -1,22 +1,19 @@
-"""The files about an experiment: tables, figures and a page."""
+"""The files about an experiment: tables, a figure and a page."""
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import tomli_w
-from numpy.typing import NDArray
 
 from kinarm._files import write_text
 from kinarm._tables import csv_text
 from kinarm.evaluation.experiments import table
-from kinarm.evaluation.experiments.plan import Run
-from kinarm.evaluation.experiments.table import Group, identity, shorter, shown
-from kinarm.evaluation.figures import COLOURS, Band, panels_figure, save_figure
+from kinarm.evaluation.experiments.table import Group, shown
+from kinarm.evaluation.figures import Band, panels_figure, save_figure
 from kinarm.evaluation.report.templating import markdown_table, template_environment
-from kinarm.evaluation.statistics import share_over_seeds
 from kinarm.policies.provenance import package_versions, source_commit
 
 if TYPE_CHECKING:
@@ -25,28 +22,31 @@ if TYPE_CHECKING:
 
     from kinarm.evaluation.experiments.study import Study
 
+CURVES = "learning_curves"
+"""Name of the files of the figure."""
+
 LINES = 8
-"""Most groups that a figure shows of a problem, the best ones."""
+"""Most groups that it shows of a problem, the best ones."""
 
 
 def write_all(study: "Study", command: str = "") -> Path:
     """Write the results of a study, and return the page.
 
     The files are ``index.html``, ``RESULTS.md``, ``results.json``, ``runs.csv``, ``curves.csv`` and
-    the figures; ``command`` is recorded. Raises OutputError if a file cannot be written.
+    the figure; ``command`` is recorded. Raises OutputError if a file cannot be written.
     """
     folder = study.store.folder
     write_csv(folder / "runs.csv", study.rows())
     write_csv(folder / "curves.csv", table.curve_rows(study))
-    drawings = {}
-    for name, figure in draw_all(study).items():
-        _, drawn = save_figure(figure, folder, name)
-        drawings[name] = drawn.read_text()
+    curves = ""
+    if figure := learning_curves(study):
+        _, drawn = save_figure(figure, folder, CURVES)
+        curves = drawn.read_text()
     document = results_document(study, command)
     write_text(folder / "results.json", json.dumps(document, indent=1) + "\n")
-    write_text(folder / "RESULTS.md", _page("results.md", study, document, drawings))
+    write_text(folder / "RESULTS.md", _page("results.md", study, document, curves))
     page = folder / "index.html"
-    write_text(page, _page("experiment.html", study, document, drawings))
+    write_text(page, _page("experiment.html", study, document, curves))
     return page
 
 
@@ -79,7 +79,7 @@ def results_document(study: "Study", command: str) -> dict[str, Any]:
     }
 
 
-def _page(name: str, study: "Study", document: dict[str, Any], drawings: Mapping[str, str]) -> str:
+def _page(name: str, study: "Study", document: dict[str, Any], curves: str) -> str:
     """A page that fetches nothing, by its template; equal input gives equal text."""
     environment = template_environment(autoescape=name.endswith(".html"))
     experiment, groups = study.experiment, study.best(len(study))
@@ -95,10 +95,7 @@ def _page(name: str, study: "Study", document: dict[str, Any], drawings: Mapping
         headings=[column.heading for column in table.COLUMNS],
         rows=[table.group_row(group) for group in groups],
         rows_in_order=[table.group_row(group) for group in study.groups()],
-        figures=[
-            (name, name.replace("_", " ").capitalize(), drawing[drawing.index("<svg") :])
-            for name, drawing in drawings.items()
-        ],
+        curves=curves[curves.index("<svg") :] if curves else "",
         failures=[(run.name, error) for run, error in study.failures.items()],
         sources=[
             (each.title or each.name, each.source) for each in experiment.entries if each.source
@@ -107,12 +104,6 @@ def _page(name: str, study: "Study", document: dict[str, Any], drawings: Mapping
         meanings=[(each.heading, each.meaning) for each in table.COLUMNS if each.meaning],
         markdown_table=markdown_table,
     )
-
-
-def draw_all(study: "Study") -> dict[str, "Figure"]:
-    """All figures that a study has data for, by name."""
-    figures = {draw.__name__: draw(study) for draw in (learning_curves, effects)}
-    return {name: figure for name, figure in figures.items() if figure is not None}
 
 
 def _by_problem(study: "Study") -> dict[str, list[Group]]:
@@ -164,70 +155,3 @@ def _draw_curves(panels: "Sequence[Axes]", group: Group, number: int) -> None:
         curves = [(seed[:, column], seed[:, 2]) for seed in begun if len(seed)]
         if curves := [(x, y) for x, y in curves if np.isfinite(x).all()]:
             Band.of(curves).draw(axes, group.label, number)
-
-
-def effects(study: "Study") -> "Figure | None":
-    """Success by the value of each field that varies, a panel per field.
-
-    Shown are means over everything else that varies, with 95 % intervals over seeds and trials;
-    for fields drawn from a range, all trainings. None if nothing varies.
-    """
-    fields = {name: runs for name, runs in _by_value(study).items() if len(runs) > 1}
-    if not fields:
-        return None
-    columns = min(3, len(fields))
-    rows = -(-len(fields) // columns)
-    size = 0.6 + 3.6 * columns, 0.4 + 3.0 * rows
-    figure, panels = panels_figure(size, rows, columns, sharey=True)
-    for (field, runs), axes in zip(fields.items(), panels.flat, strict=False):
-        _draw_effect(axes, study, field, runs)
-    for axes in list(panels.flat)[len(fields) :]:
-        axes.set_visible(False)
-    for row in panels:
-        row[0].set_ylabel("share of trials with success")
-    return figure
-
-
-ByValue = dict[str, tuple[Any, list[Run]]]
-"""Values of a field by their text, with their finished trainings."""
-
-
-def _by_value(study: "Study") -> dict[str, ByValue]:
-    """Values of the fields that can vary, by field."""
-    found: dict[str, ByValue] = {}
-    for run in study.finished:
-        varying = {**identity(run), **run.choices}
-        del varying["seed"]
-        for field, value in varying.items():
-            found.setdefault(field, {}).setdefault(shown(value), (value, []))[1].append(run)
-    return found
-
-
-def _draw_effect(axes: "Axes", study: "Study", field: str, runs: ByValue) -> None:
-    """Draw the success of each value of a field."""
-    values = [value for value, _ in runs.values()]
-    numeric = all(isinstance(v, int | float) and not isinstance(v, bool) for v in values)
-    places = values if numeric else [*range(len(values))]
-    if numeric and min(places) > 0 and max(places) / min(places) >= 10:
-        axes.set_xscale("log")
-    drawn = numeric and field in (*study.experiment.random, *study.experiment.search)
-    for place, (_, same) in zip(places, runs.values(), strict=True):
-        if drawn:
-            shares = [study.finished[run].outcomes.success.mean() for run in same]
-            axes.plot([place] * len(same), shares, "o", color=COLOURS[0], alpha=0.5, ms=4)
-        else:
-            by_seed: dict[int, list[NDArray[np.float64]]] = {}
-            for run in same:
-                hits = study.finished[run].outcomes.success.astype(np.float64)
-                by_seed.setdefault(run.config.seed, []).append(hits)
-            seeds = np.array([np.mean(each, axis=0) for each in by_seed.values()])
-            mean = share_over_seeds(seeds)
-            value = mean.value or 0.0
-            low, high = mean.ci95 or (value, value)
-            bars = [[max(value - low, 0.0)], [max(high - value, 0.0)]]
-            axes.errorbar(place, value, yerr=bars, fmt="o", color=COLOURS[0], capsize=3)
-    if not drawn and (not numeric or len(runs) <= 6):
-        axes.set_xticks(places, [*runs], rotation=0 if numeric else 20)
-        axes.minorticks_off()
-    axes.margins(x=0.2)
-    axes.set(title=shorter(field), ylim=(0, 1.02))

@@ -8,26 +8,20 @@ from functools import cached_property
 from itertools import product
 from typing import Any
 
-import numpy as np
-
 from kinarm import SEMANTICS
 from kinarm._fields import from_plain, init_fields, to_plain
 from kinarm.errors import InvalidInputError, KinarmError, UnknownNameError
 from kinarm.evaluation.experiments.curve import TrialSettings
-from kinarm.evaluation.experiments.experiment import MOST_TRAININGS, Entry, Experiment, ranges_of
+from kinarm.evaluation.experiments.experiment import MOST_TRAININGS, Entry, Experiment
 from kinarm.policies.config import TrainingConfig
 from kinarm.policies.learners import Learner, find_learner
 from kinarm.policies.recipes import recipe
 from kinarm.problem import ReachProblem
-from kinarm.randomness import Stream, stream_generator
 
 Learners = Mapping[str, Learner[Any, Any]]
 
 CHOSEN = {"seed", "recipe"}
 """Settings that the experiment chooses."""
-
-DIGITS = 6
-"""Significant digits of drawn numbers: more could differ between machines."""
 
 PROBLEM = "problem."
 """Beginning of the path of a field of the problem."""
@@ -114,7 +108,7 @@ def plan(
     learners = {each.name: each for each in map(find_learner, names)}
     for key in experiment.searched:
         _concerned(key, learners)
-    varied = list(drawn_choices(experiment)) if choices is None else choices
+    varied = list(_combinations(experiment.grid)) if choices is None else choices
     each = [
         (entry, config, to_plain(config), chosen, entry.seeds or experiment.seeds)
         for entry in experiment.all_entries
@@ -139,32 +133,6 @@ def plan(
                 )
                 found.setdefault((entry.name, run.key), run)
     return tuple(found.values())
-
-
-def drawn_choices(experiment: Experiment) -> Iterator[dict[str, Any]]:
-    """Every combination of the values that vary, by field."""
-    random = experiment.random
-    for of_grid in _combinations(experiment.grid):
-        for number in range(random.get("count", 1)):
-            # A larger number of draws keeps the first ones.
-            rng = stream_generator(Stream.STUDY, random.get("seed", 0), number)
-            drawn = {key: _draw(entry, rng.random()) for key, entry in ranges_of(random).items()}
-            yield {**of_grid, **drawn}
-
-
-def _draw(entry: Any, uniform: float) -> Any:
-    """Value of a list or range for a number in [0, 1); whole between whole ones."""
-    if isinstance(entry, list | tuple):
-        return entry[int(uniform * len(entry))]
-    low, high = entry["low"], entry["high"]
-    whole = isinstance(low, int) and isinstance(high, int)
-    if entry.get("log"):
-        value = float(low * np.exp(uniform * np.log(high / low)))
-    else:
-        value = low + uniform * (high - low + whole)
-    if whole:
-        return min(int(value), high)
-    return float(f"{value:.{DIGITS}g}")
 
 
 def _combinations(grid: Mapping[str, Any]) -> Iterator[dict[str, Any]]:

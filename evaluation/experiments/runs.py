@@ -7,7 +7,7 @@ training.
 import io
 import math
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -143,7 +143,6 @@ def train(
     task: Task,
     threads: int = 1,
     *,
-    on_point: Callable[[CurvePoint], object] | None = None,
     logs: Path | None = None,
 ) -> TaskResult:
     """Train and evaluate; neither threads nor interruptions change the result.
@@ -152,8 +151,6 @@ def train(
     ----------
     task, threads : Task and int
         The training, and its number of threads.
-    on_point : callable, optional
-        Called with every point of the learning curve.
     logs : Path, optional
         Folder of logs for TensorBoard, with a folder for each seed.
     """
@@ -170,8 +167,7 @@ def train(
     place = checkpoint if checkpoint is not None and checkpoint.parent.is_dir() else None
     saved = time.monotonic()
     for state in states:
-        if curve.update(state) and on_point is not None:
-            on_point(curve.points[-1])
+        curve.update(state)
         if place is not None and time.monotonic() - saved > CHECKPOINT_SECONDS:
             save_checkpoint(place, config, state, curve.so_far())
             saved = time.monotonic()

@@ -1,8 +1,6 @@
 """Search for the best settings of a learner, by Optuna."""
 
-from collections.abc import Mapping
-from functools import partial
-from itertools import count
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -11,12 +9,9 @@ import tomli_w
 
 from kinarm._fields import to_plain
 from kinarm._files import first_line, write_text
-from kinarm.errors import needed
-from kinarm.evaluation.experiments.curve import CurvePoint
-from kinarm.evaluation.experiments.executors import LocalExecutor
-from kinarm.evaluation.experiments.experiment import SEARCH_CHOICES, Experiment
+from kinarm.errors import KinarmError, needed
+from kinarm.evaluation.experiments.experiment import SAMPLERS, Experiment
 from kinarm.evaluation.experiments.plan import Run, plan
-from kinarm.evaluation.experiments.runs import Task, train
 from kinarm.evaluation.experiments.store import Store
 from kinarm.policies.config import TrainingConfig
 from kinarm.policies.recipes import PER_TRAINING
@@ -28,111 +23,103 @@ JOURNAL, RECIPE = "search.journal", "best.toml"
 """Files of a search in the folder of its study."""
 
 
-def _open_search(experiment: Experiment, folder: Path, draws: int = 0) -> "optuna.study.Study":
-    """Open or begin the search of an experiment in a folder.
+TrainAll = Callable[[Sequence[Run]], object]
+"""Trains some runs; the store says why others failed."""
 
-    ``draws`` tells the random numbers of this process from those of others.
-    """
+FAILURES = 20
+"""Impossible proposals after which a search ends."""
+
+
+def _open_search(experiment: Experiment, folder: Path) -> "optuna.study.Study":
+    """Open or begin the search of an experiment in a folder."""
     needed("optuna", "optuna", "tune")
     import optuna
     from optuna.storages import JournalStorage
     from optuna.storages.journal import JournalFileBackend
 
     optuna.logging.set_verbosity(optuna.logging.ERROR)
-    said = experiment.search
-    seed = int(np.random.SeedSequence([said.get("seed", 0), draws]).generate_state(1)[0])
-    names = {kind: said.get(kind, next(iter(known))) for kind, known in SEARCH_CHOICES.items()}
-    liar = {"constant_liar": True} if names["sampler"] == "tpe" else {}
-    sampler, pruner = (
-        getattr(module, SEARCH_CHOICES[kind][names[kind]])
-        for kind, module in (("sampler", optuna.samplers), ("pruner", optuna.pruners))
-    )
-    return optuna.create_study(
+    search = optuna.create_study(
         study_name="kinarm",
         storage=JournalStorage(JournalFileBackend(str(folder / JOURNAL))),
-        sampler=sampler(seed=seed, **liar),
-        pruner=pruner(),
         direction="maximize",
         load_if_exists=True,
     )
+    said = experiment.search
+    name = said.get("sampler", "tpe")
+    liar = {"constant_liar": True} if name == "tpe" else {}
+    # One that goes on has other random numbers than when it began.
+    sequence = np.random.SeedSequence([said.get("seed", 0), len(search.trials)])
+    seed = int(sequence.generate_state(1)[0])
+    search.sampler = getattr(optuna.samplers, SAMPLERS[name])(seed=seed, **liar)
+    return search
 
 
-def carry_out_search(experiment: Experiment, folder: Path, jobs: int, threads: int) -> None:
+def carry_out_search(experiment: Experiment, store: Store, jobs: int, train_all: TrainAll) -> None:
     """Try as many settings as the experiment says, interrupted ones again.
 
     Parameters
     ----------
-    experiment, folder : Experiment and Path
+    experiment, store : Experiment and Store
         The experiment and its folder, to which no other process may write.
-    jobs, threads : int
-        Settings tried at a time, and threads of a training.
+    jobs : int
+        Settings tried at a time.
+    train_all : callable
+        Trains some runs; the store says why others failed.
     """
     # A process that was killed may have left its lock.
-    for left in folder.glob(f"{JOURNAL}.lock*"):
+    for left in store.folder.glob(f"{JOURNAL}.lock*"):
         left.unlink(missing_ok=True)
-    search = _open_search(experiment, folder)
+    search, failed = _open_search(experiment, store.folder), 0
     for trial in search.trials:
         if trial.state.name == "RUNNING":
             search.tell(trial.number, state=type(trial.state).FAIL)
             search.enqueue_trial(trial.params)
-    done = [trial for trial in search.trials if trial.state.name in ("COMPLETE", "PRUNED")]
-    missing = experiment.search["count"] - len(done)
-    if missing > 0:
-        jobs = min(jobs, missing)
-        shares = [len(range(number, missing, jobs)) for number in range(jobs)]
-        work = partial(_try_settings, experiment, folder, threads)
-        tasks = [(share, len(search.trials) + number) for number, share in enumerate(shares)]
-        list(LocalExecutor(jobs, threads).map(work, tasks))
-    if any(trial.state.name == "COMPLETE" for trial in search.trials):
+    while failed < FAILURES:
+        missing = experiment.search["count"] - len(_complete(search))
+        if missing <= 0:
+            break
+        failed += _try_settings(experiment, search, store, min(jobs, missing), train_all)
+    if _complete(search):
         best = plan(experiment, [_choices(experiment, search.best_trial)])[0]
-        write_text(folder / RECIPE, tomli_w.dumps(recipe_entries(best.config)))
-
-
-FAILURES = 20
-"""Impossible proposals of a worker before they count."""
+        write_text(store.folder / RECIPE, tomli_w.dumps(recipe_entries(best.config)))
 
 
 def _try_settings(
-    experiment: Experiment, folder: Path, threads: int, task: tuple[int, int]
-) -> None:
-    """Try a share of the settings, one after the other."""
-    import optuna
+    experiment: Experiment,
+    search: "optuna.study.Study",
+    store: Store,
+    count: int,
+    train_all: TrainAll,
+) -> int:
+    """Train with some proposals on all problems with all seeds; return how many failed."""
     from optuna.trial import TrialState
 
-    share, draws = task
-    search, store, failed = _open_search(experiment, folder, draws), Store(folder), 0
-    while share > 0:
-        trial = search.ask()
+    planned, errors = [], dict[Any, str | None]()
+    for trial in (search.ask() for _ in range(count)):
+        choices = {key: _suggest(trial, key, entry) for key, entry in experiment.searched.items()}
         try:
-            search.tell(trial, _mean_success(experiment, store, trial, threads))
-        except optuna.TrialPruned:
-            search.tell(trial, state=TrialState.PRUNED)
-        except Exception as error:  # settings can be impossible: another proposal takes their place
-            trial.set_user_attr("error", first_line(error))
-            search.tell(trial, state=TrialState.FAIL)
-            failed += 1
-            if failed < FAILURES:
-                continue
-        share -= 1
+            planned.append((trial, plan(experiment, [choices])))
+        except KinarmError as error:  # settings can be impossible: others take their place
+            errors[trial] = first_line(error)
+    runs = [run for _, each in planned for run in each]
+    found = store.load(runs)
+    train_all([run for run in runs if run not in found])
+    found = store.load(runs)
+    for trial, each in planned:
+        if lost := [run for run in each if run not in found]:
+            errors[trial] = store.failure(lost[0])
+        else:
+            shares = [float(found[run].outcomes.success.mean()) for run in each]
+            search.tell(trial, float(np.mean(shares)))
+    for trial, why in errors.items():
+        trial.set_user_attr("error", why)
+        search.tell(trial, state=TrialState.FAIL)
+    return len(errors)
 
 
-def _mean_success(experiment: Experiment, store: Store, trial: Any, threads: int) -> float:
-    """Train with the settings of a trial on all problems with all seeds."""
-    import optuna
-
-    choices = {key: _suggest(trial, key, entry) for key, entry in experiment.searched.items()}
-    shares, numbers = [], count()
-
-    def on_point(point: CurvePoint) -> None:
-        trial.report(point.success, next(numbers))
-        if trial.should_prune():
-            raise optuna.TrialPruned
-
-    for number, run in enumerate(plan(experiment, [choices])):
-        if not store.load([run]):
-            store.save(run, train(Task(run), threads, on_point=on_point if number == 0 else None))
-        shares.append(float(store.load([run])[run].outcomes.success.mean()))
-    return float(np.mean(shares))
+def _complete(search: "optuna.study.Study") -> "list[optuna.trial.FrozenTrial]":
+    """The proposals that were tried to the end, in order."""
+    return [trial for trial in search.trials if trial.state.name == "COMPLETE"]
 
 
 def _suggest(trial: Any, key: str, entry: Any) -> Any:
@@ -148,8 +135,8 @@ def _suggest(trial: Any, key: str, entry: Any) -> Any:
 
 def searched_runs(experiment: Experiment, folder: Path) -> tuple[Run, ...]:
     """The trainings of settings that were tried to the end, in order."""
-    trials = _open_search(experiment, folder).trials if (folder / JOURNAL).exists() else []
-    complete = [trial for trial in trials if trial.state.name == "COMPLETE"]
+    begun = (folder / JOURNAL).exists()
+    complete = _complete(_open_search(experiment, folder)) if begun else []
     return plan(experiment, [_choices(experiment, trial) for trial in complete])
 
 

@@ -53,17 +53,21 @@ class Store:
         cannot be written to, or another process writes to it.
         """
         check_folder(self.folder)
-        marker = self.folder / SPECIFICATION
         with only_writer(self.folder):
-            if marker.exists() and (there := Experiment.load(marker).name) != experiment.name:
-                raise InvalidInputError(
-                    f"{str(self.folder)!r} is of the experiment {there!r}, not of "
-                    f"{experiment.name!r}: name another folder with --out"
-                )
+            self.check(experiment)
             for kind in FOLDERS:
                 check_folder(self.folder / kind)
-            write_text(marker, tomli_w.dumps(experiment.to_json()))
+            write_text(self.folder / SPECIFICATION, tomli_w.dumps(experiment.to_json()))
             yield self
+
+    def check(self, experiment: Experiment) -> None:
+        """Refuse the folder of another experiment."""
+        marker = self.folder / SPECIFICATION
+        if marker.exists() and (there := Experiment.load(marker).name) != experiment.name:
+            raise InvalidInputError(
+                f"{str(self.folder)!r} is of the experiment {there!r}, not of "
+                f"{experiment.name!r}: name another folder with --out"
+            )
 
     def save(self, run: Run, result: TaskResult | Failure) -> None:
         """Keep the result of a training, or why it failed."""

@@ -1,7 +1,7 @@
 """A study: an experiment in its folder, how to run it, and its results."""
 
 import math
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from functools import cached_property, partial
@@ -135,40 +135,51 @@ class Study:
         jobs = available_threads() if jobs is None else whole_number("jobs", jobs, 1)
         for entry in self.experiment.all_entries:
             find_learner(entry.learner).check_installed()
-        failures: dict[str, str] = {}
-        with self.store.writing(self.experiment) as store:
+        where, work = executor or LocalExecutor(jobs, threads), partial(train, threads=threads)
+        train_all = partial(self._train, where, partial(work, logs=logs), on_trained)
+        with self.store.writing(self.experiment):
             if self.experiment.search:
-                carry_out_search(self.experiment, store.folder, jobs, threads)
+                carry_out_search(self.experiment, self.store, jobs, train_all)
             self.refresh()
-            where = executor or LocalExecutor(jobs, threads)
-            # Trainings that several entries share come once.
-            missing = {run.key: run for run in self.missing}.values()
-            tasks = [
-                Task(run, store.start(run), absolute(store.path("checkpoints", run)))
-                for run in missing
-            ]
-            work, done = partial(train, threads=threads, logs=logs), list[str]()
-            with self._progress(len(tasks), done) as show:
-                for (run, *_), result in where.map(work, tasks):
-                    store.save(run, result)
-                    if isinstance(result, Failure):
-                        failures[run.name] = result.error
-                    else:
-                        on_trained(run, result)
-                    done.append(run.name)
-                    show()
+            failures = train_all(self.missing)
         self.refresh()
         if failures:
             raise TrainingFailedError(failures, len(self.runs))
         return self
 
+    def _train(
+        self,
+        executor: Executor,
+        work: Callable[[Task], TaskResult],
+        on_trained: Callable[[Run, TaskResult], object],
+        runs: Sequence[Run],
+    ) -> dict[str, str]:
+        """Train some runs, and return why others failed, by name."""
+        # Trainings that several entries share come once.
+        distinct = tuple({run.key: run for run in runs}.values())
+        tasks = [
+            Task(run, self.store.start(run), absolute(self.store.path("checkpoints", run)))
+            for run in distinct
+        ]
+        failures, done = dict[str, str](), list[str]()
+        with self._progress(distinct, done) as show:
+            for (run, *_), result in executor.map(work, tasks):
+                self.store.save(run, result)
+                if isinstance(result, Failure):
+                    failures[run.name] = result.error
+                else:
+                    on_trained(run, result)
+                done.append(run.name)
+                show()
+        return failures
+
     @contextmanager
-    def _progress(self, total: int, done: list[str]) -> Iterator[Callable[[], None]]:
+    def _progress(self, runs: Sequence[Run], done: list[str]) -> Iterator[Callable[[], None]]:
         """Show how many trainings are done, and how far others are."""
         over = Event()
 
         def show() -> None:
-            shares = self.store.shares(self.runs)
+            shares = self.store.shares(runs)
             under_way = [f"{len(shares)} under way {100 * np.mean(shares):.0f} %"] if shares else []
             line.update(len(done) + sum(shares), [*under_way, *done[-1:]])
 
@@ -176,7 +187,7 @@ class Study:
             while not over.wait(CHECKPOINT_SECONDS):
                 show()
 
-        with ProgressLine("trainings", total, "finished") as line:
+        with ProgressLine("trainings", len(runs), "finished") as line:
             show()
             with kept_from_children():  # such a thread gets no request to end, either
                 (thread := Thread(target=show_again, daemon=True)).start()

@@ -17,7 +17,7 @@ from kinarm.evaluation.experiments.runs import TrainedRun
 from kinarm.evaluation.metrics import METRICS
 from kinarm.evaluation.outcomes import Outcomes
 from kinarm.evaluation.statistics import Estimate, share_difference, share_over_seeds
-from kinarm.evaluation.table import SEEDS_PRIORITY, difference_cell, metric_column, raw_estimate
+from kinarm.evaluation.table import SEEDS_PRIORITY, difference_cell, metric_column
 from kinarm.policies.config import TrainingConfig
 from kinarm.policies.oracle import OracleSolutions
 
@@ -186,7 +186,6 @@ def _difference_column() -> Column[Group]:
         "difference",
         meaning,
         priority=9.5,
-        values=lambda group: raw_estimate("difference", group.difference),
     )
 
 
@@ -201,13 +200,7 @@ def _until_column(level: float) -> Column[Group]:
         time = "" if math.isnan(seconds) else f", {seconds / 60:.2f}"
         return f"{steps / 1e3:,.0f}{time}"
 
-    def values(group: Group) -> dict[str, float | None]:
-        known = _until_entries(group, level)
-        return {
-            f"{name}_{part}": known[part] for part in ("environment_steps", "processor_seconds")
-        }
-
-    return Column(f"thousand steps, minutes to {level:.0%}", text, name, priority=1, values=values)
+    return Column(f"thousand steps, minutes to {level:.0%}", text, name, priority=1)
 
 
 def _number_column(
@@ -220,18 +213,11 @@ def _number_column(
         lambda group: f"{value(group) / per:.{digits}f}",
         name,
         priority=priority,
-        values=lambda group: {name: value(group)},
     )
 
 
 COLUMNS: tuple[Column[Group], ...] = (
-    Column(
-        "trainings",
-        attrgetter("label"),
-        priority=ALWAYS,
-        values=lambda group: {"trainings": group.label, **group.choices},
-        words=True,
-    ),
+    Column("trainings", attrgetter("label"), priority=ALWAYS, words=True),
     Column("seeds", lambda group: len(group.runs), priority=SEEDS_PRIORITY),
     *(metric_column(name, _estimates) for name in FIGURES[:1]),
     _difference_column(),

@@ -1,1 +1,1 @@
-"""Replays: choosing and recording trials, or following them live."""
+"""Replays: choosing and recording trials."""

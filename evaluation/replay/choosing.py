@@ -1,20 +1,18 @@
-"""Trials to replay: new, of an evaluation, or recordings of a file."""
+"""Trials to replay: new ones, or recordings of a file."""
 
 from collections import Counter
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
-from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
 from kinarm.errors import InvalidInputError, UnknownNameError
 from kinarm.evaluation.bounds import oracle_bounds
-from kinarm.evaluation.contestants import ORACLE, UNTRAINED, Contestant, bare_name
-from kinarm.evaluation.document import EvaluationDocument, Result
-from kinarm.evaluation.finding import check_normalizing, find_contestants, is_import_path
+from kinarm.evaluation.contestants import ORACLE, Contestant
+from kinarm.evaluation.finding import check_normalizing, find_contestants
 from kinarm.evaluation.outcomes import failure_causes
 from kinarm.evaluation.replay.runs import record
 from kinarm.evaluation.trials import TrialSet
-from kinarm.policies.library import BEST, group_of, policy_names
+from kinarm.policies.library import BEST, group_of
 from kinarm.problem import ReachProblem
 from kinarm.recording import Recording, load_recordings
 
@@ -79,8 +77,6 @@ def _find_candidates(request: "ReplayRequest") -> Candidates:
     names = request.compare or (request.policy or default,)
     if request.source is None:
         return _fresh_candidates(request, names)
-    if request.source.suffix == ".json":
-        return _evaluated_candidates(request.source, request, names)
     problem, arm, runs = request.problem, request.arm, []
     recorded = load_recordings(request.source)
     found = [each for each in recorded if problem in (None, each.problem.name)]
@@ -132,63 +128,12 @@ def named_contestants(
 
 
 def _first_contestant(
-    name: str | None,
-    problem: ReachProblem | None = None,
-    request: "ReplayRequest | None" = None,
+    name: str | None, problem: ReachProblem | None, request: "ReplayRequest"
 ) -> Contestant:
     """The contestant of a name, of a group the first seed."""
     if name is None:
-        raise InvalidInputError("name a --policy, or a file of recordings or of an evaluation")
-    how = (request.vec_normalize, request.wrapper) if request else ()
-    return find_contestants(name, problem, *how)[0]
-
-
-def _evaluated_candidates(
-    path: Path, request: "ReplayRequest", names: Sequence[str | None]
-) -> Candidates:
-    """Run policies on the trials of an evaluation again."""
-    document, problem = EvaluationDocument.load(path), request.problem
-    chosen = []
-    for name in names:
-        contestant = None
-        bare = bare_name(name or "")
-        if Path(bare).suffix in (".npz", ".zip") or is_import_path(bare):
-            faced = problem or next(iter(document.protocol.problems))
-            contestant = _first_contestant(name, document.problem(faced), request)
-            # An evaluation calls it by its folder, too, if others have its name.
-            called = {row.policy for row in document.results}
-            source, name = contestant.source, contestant.name
-            whole = f"{source.parent.name}/{name}" if source else ""
-            name = whole if whole in called and name not in called else name
-        row = document.result(name, problem)
-        problem = row.problem
-        if contestant is None:
-            bare = bare_name(row.policy)
-            if bare not in (*UNTRAINED, *policy_names()) and not is_import_path(bare):
-                raise InvalidInputError(
-                    f"policy {row.policy!r} of {str(path)!r} is a file: name it with --policy"
-                )
-            contestant = _first_contestant(row.policy)
-        chosen.append((row, contestant))
-    check_normalizing((contestant for _, contestant in chosen), request.vec_normalize)
-    count = min(len(row.outcomes.steps) for row, _ in chosen)
-    trials = document.trials(str(problem)).first(count)
-    runs = []
-    for row, contestant in chosen:
-        runs.append(record(contestant, trials, allow_other_arm=True))
-        _check_same(row, runs[-1])
-    return Candidates(list(zip(*runs, strict=True)), PLAYED, trials)
-
-
-def _check_same(row: Result, recordings: Sequence[Recording]) -> None:
-    """Refuse trials that end otherwise than in the evaluation."""
-    said = zip(row.outcomes.outcome, row.outcomes.steps, row.outcomes.final_distance, strict=True)
-    for each, end in zip(recordings, said, strict=False):
-        if (each.outcome, each.steps, each.final_distance) != end:
-            raise InvalidInputError(
-                f"trial {each.trial} of {row.policy!r} ends otherwise than in the evaluation: the "
-                "policy or kinarm has changed, evaluate again"
-            )
+        raise InvalidInputError("name a --policy, or a file of recordings")
+    return find_contestants(name, problem, request.vec_normalize, request.wrapper)[0]
 
 
 def _with_bounds(

@@ -1,11 +1,9 @@
 """The request for a replay."""
 
-import webbrowser
 from collections import Counter
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass, field, fields
-from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING, ClassVar
 
@@ -22,15 +20,14 @@ if TYPE_CHECKING:
     from kinarm.recording import Recording
     from kinarm.viewer.html_page import HtmlPage
 
-NOT_PLAYED = "source policy wrapper compare trial worst failures oracle record live port browser"
+NOT_PLAYED = "source policy wrapper compare trial worst failures oracle record"
 """Fields without meaning for a playground."""
 
 ALTERNATIVES = ("policy compare", "trial worst failures")
 """Fields that exclude each other."""
 
-NOT_LIVE = "source compare trial worst failures trials out record"
-NOT_FROM_FILE = f"{ProblemOptions.CHANGES.removeprefix('arm ')} seed trials"
-"""Fields without meaning for the live page, and for trials from a file."""
+NOT_RECORDED = f"{ProblemOptions.CHANGES.removeprefix('arm ')} seed trials vec_normalize wrapper"
+"""Fields without meaning for a file of recordings."""
 
 PAGE, PLAYGROUND = "replay.html", "play.html"
 """Default pages."""
@@ -41,13 +38,12 @@ GENERATOR = b'<meta name="generator" content="kinarm">'
 
 @dataclass(frozen=True, kw_only=True)
 class ReplayRequest(ProblemOptions):
-    """Write one HTML file that replays trials offline, or plays policies; or show them live.
+    """Write one HTML file that replays trials offline, or plays policies.
 
     Parameters
     ----------
     source : Path
-        File to take trials from, evaluation.json of kinarm-eval or recordings
-        (.npz); or a policy, as for --policy.
+        File of recordings (.npz); or a policy, as for --policy.
     policy : str
         Shipped policy or recipe (its first seed), best, random, zero, oracle,
         .npz file, folder of them (the first), Stable-Baselines3's model.zip
@@ -85,13 +81,6 @@ class ReplayRequest(ProblemOptions):
     overwrite : bool
         Replace files that exist; a page of kinarm with the default name always
         is.
-    live : bool
-        Serve endless fresh trials to the browser of this machine instead of
-        writing a page.
-    port : int
-        Port of --live.
-    browser : bool
-        Open the live page in a browser.
 
     Raises
     ------
@@ -123,16 +112,13 @@ class ReplayRequest(ProblemOptions):
     out: Path | None = None
     record: Path | None = None
     overwrite: bool = False
-    live: bool = False
-    port: int | None = field(default=None, metadata={"at_most": 65535})
-    browser: bool = True
 
     SHIELDS_POLICIES: ClassVar = True
 
     GROUPS: ClassVar = {
         "what is replayed": "source policy vec_normalize wrapper compare play allow_other_arm",
         "which trials": "trials seed trial worst failures oracle",
-        "output": "out record overwrite live port browser",
+        "output": "out record overwrite",
         **ProblemOptions.GROUPS,
     }
     DEFAULTS: ClassVar = {
@@ -143,7 +129,6 @@ class ReplayRequest(ProblemOptions):
         "play": "without names, four that ship",
         "seed": "0",
         "out": f"{PAGE}, or {PLAYGROUND} for --play",
-        "port": "7000, or the next free one",
     }
 
     def __post_init__(self) -> None:
@@ -155,15 +140,8 @@ class ReplayRequest(ProblemOptions):
             given = self._given(names)
             if len(given) > 1:
                 raise InvalidInputError(f"{given[0]} and {given[1]} exclude each other")
-        if self.port is not None and not self.live:
-            raise InvalidInputError("--port goes with --live")
         self._refuse("--play", NOT_PLAYED if self.play is not None else "")
-        self._refuse("--live", NOT_LIVE if self.live else "")
-        self._refuse("trials from a file", NOT_FROM_FILE if self.source else "")
-        if self.source is not None and self.source.suffix == ".json":
-            self._refuse("trials of an evaluation", "arm")
-        elif self.source is not None:
-            self._refuse("a file of recordings", "vec_normalize wrapper")
+        self._refuse("a file of recordings", NOT_RECORDED if self.source else "")
 
     def _refuse(self, mode: str, names: str) -> None:
         for option in self._given(names):
@@ -177,10 +155,8 @@ class ReplayRequest(ProblemOptions):
         )
         return ["a file" if item.name == "source" else option_name(item) for item in given]
 
-    def run(self, report: Callable[[str], object] = lambda _: None) -> "HtmlPage | None":
+    def run(self, report: Callable[[str], object] = lambda _: None) -> "HtmlPage":
         """Write the page, and the recordings if asked for, and return it.
-
-        Or serve the live page until interrupted.
 
         Parameters
         ----------
@@ -193,9 +169,6 @@ class ReplayRequest(ProblemOptions):
             If a file, name or number cannot be used, or a file cannot be
             written.
         """
-        if self.live:
-            self._serve(report)
-            return None
         return self._write(report) if self.play is None else self._write_playground(report)
 
     def recordings(self) -> "list[list[Recording]]":
@@ -257,34 +230,11 @@ class ReplayRequest(ProblemOptions):
         report(f"written: {out}, {len(page.html) / 1e6:.1f} MB, plays offline in any browser")
         return page
 
-    def _serve(self, report: Callable[[str], object]) -> None:
-        from kinarm.evaluation.replay.choosing import named_contestants
-        from kinarm.evaluation.replay.runs import follow, fresh_recordings
-        from kinarm.simulator import Simulator
-        from kinarm.viewer.live_server import PORT, LiveServer
-
-        (contestant,), problem = named_contestants(self, [self.policy])
-        simulator = Simulator(problem)
-        say_choices([simulator.problem])
-        contestant.check(problem, simulator.arm, allow_other_arm=self.allow_other_arm)
-        fresh = fresh_recordings(contestant, simulator, self.seed or 0)
-        # The first one loads and compiles what is needed before the page is announced.
-        recordings = chain([next(fresh)], fresh)
-        wanted = self.port or PORT
-        with LiveServer(wanted) as server:
-            if server.port != wanted:
-                report(f"port {wanted} is in use: taking {server.port}")
-            report(f"{contestant.name} at {server.address} (stop with Ctrl-C)")
-            if self.browser:
-                webbrowser.open(server.address)
-            for recording in follow(server, simulator, recordings):
-                report(described(recording))
-
 
 def is_policy(source: Path) -> bool:
-    """Whether it is no file of trials: a policy file, or what else names a policy."""
+    """Whether it is no file of recordings: a policy file, or what else names a policy."""
     if source.suffix != ".npz":
-        return source.suffix != ".json"
+        return True
     with suppress(Exception), np.load(source, allow_pickle=False) as content:
         return str(content["format"]) == "kinarm-policy"
     return False

@@ -47,9 +47,8 @@ EVALUATED = (
     "kinarm-eval --policy ars-tuned-both-seed0 --problem right --no-oracle --trials 20 --out out"
 )
 REPLAYED = "kinarm-replay --policy ars-tuned-both-seed0 --trials 3 --out r.html --record r.npz"
-CHECKED = "kinarm-problem check right --trials 20 --picture p.png --json p.json"
+CHECKED = "kinarm-problem check right --trials 20 --picture p.png"
 SHOWN = "kinarm-arms show paper --out arm.html"
-LIVE = "kinarm-replay --policy zero --problem left --live --no-browser"
 SHORT = TRAIN.replace("1500", "3")
 
 
@@ -221,7 +220,7 @@ def limit(command: str, count: int, seed: int, tally: Tally) -> None:
 Disturb = Callable[[str, int, int, Tally], None]
 WAYS: dict[Disturb, tuple[str, ...]] = {
     kill: (TRAIN, STUDIED),
-    interrupt: (TRAIN, STUDIED, EVALUATED, REPLAYED, LIVE, CHECKED, SHOWN),
+    interrupt: (TRAIN, STUDIED, EVALUATED, REPLAYED, CHECKED, SHOWN),
     limit: (SHORT, EVALUATED, REPLAYED, CHECKED, SHOWN),
 }
 if __name__ == "__main__":

@@ -95,9 +95,8 @@ def _checkpoint(path: Path) -> None:
 
 
 def _evaluation(path: Path) -> None:
-    document = EvaluationDocument.load(path)
-    row = document.result(None, None)
-    document.problem(row.problem)
+    for faced in EvaluationDocument.load(path).protocol.problems.values():
+        ReachProblem.from_json(faced.problem)
 
 
 def _arm(path: Path) -> None:

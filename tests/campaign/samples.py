@@ -114,10 +114,6 @@ reward.success = 2.0
 [grid]
 step_size = [0.01, 0.02]
 "problem.task.start_spread" = [0.2]
-
-[random]
-count = 1
-noise = { low = 0.01, high = 0.1, log = true }
 sharing = ["none", "pair"]
 """
 

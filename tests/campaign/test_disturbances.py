@@ -5,7 +5,7 @@ import pytest
 from kinarm._files import only_writer
 
 from . import disturbances
-from .disturbances import EVALUATED, LIVE, STUDIED, TRAIN, ended, started, unfit
+from .disturbances import EVALUATED, STUDIED, TRAIN, ended, started, unfit
 from .tally import Tally
 
 pytestmark = pytest.mark.rare
@@ -16,7 +16,6 @@ pytestmark = pytest.mark.rare
     [
         ("kill", TRAIN, 1),
         ("interrupt", STUDIED, 1),
-        ("interrupt", LIVE, 1),
         ("limit", EVALUATED, 2),
     ],
 )

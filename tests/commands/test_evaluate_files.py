@@ -1,6 +1,5 @@
 """``kinarm-eval``: files and reports that it writes."""
 
-import csv
 import json
 
 import pytest
@@ -48,42 +47,21 @@ def test_the_report_of_more_trials_than_are_bounded(run, policy_folder, tmp_path
     assert (answer.status, answer.err) == (0, "")
     assert "not asked" in (tmp_path / "index.html").read_text(encoding="utf-8")
     document = EvaluationDocument.load(tmp_path / "evaluation.json")
-    assert document.faced("right").oracle.bounded == 4
-    page = (*arguments[:2], "--worst", 9, "--out", tmp_path / "worst.html")
-    replayed = run("kinarm-replay", tmp_path / "evaluation.json", *page)
-    assert replayed.out.count("proven necessary") == 9
+    assert document.protocol.problems["right"].oracle.bounded == 4
 
 
-class TestCsv:
-    def test_it_holds_the_values_of_the_document(self, run, policy_folder, tmp_path):
-        asked = ("--policy", policy_folder / "mine-seed0.npz", "--trials", 8, "--no-oracle")
-        answer = run("kinarm-eval", *asked, "--out", tmp_path, "--csv", tmp_path / "a.csv")
-        assert f"written: {tmp_path / 'a.csv'}" in answer.out
-        with (tmp_path / "a.csv").open() as file:
-            (row,) = csv.DictReader(file)
-        (result,) = json.loads((tmp_path / "evaluation.json").read_text())["results"]
-        assert (row["problem"], row["policy"]) == ("right", "mine-seed0")
-        for name, metric in result["metrics"].items():
-            value = metric["value"]
-            assert row[name] == ("" if value is None else repr(value))
-            if metric["ci95"]:
-                assert [float(row[f"{name}_{end}"]) for end in ("low", "high")] == metric["ci95"]
-
-    def test_alone_it_has_the_named_columns(self, run):
+class TestColumns:
+    def test_the_table_has_the_named_ones(self, run):
         asked = ("--policy", "zero", "--problem", "left", "--trials", 2, "--no-oracle")
-        answer = run("kinarm-eval", *asked, "--csv", "-", "--columns", "max_distance, collision")
-        heading = "problem,policy,max_distance,collision,collision_low,collision_high"
-        assert answer.out.splitlines()[0] == heading
-        table = run("kinarm-eval", *asked, "--columns", "max_distance,collision").out.splitlines()
-        assert table[0].split("  ")[-2:] == ["max distance m", "collision %"]
+        answer = run("kinarm-eval", *asked, "--columns", "max_distance, collision")
+        assert answer.out.splitlines()[0].split("  ")[-2:] == ["max distance m", "collision %"]
 
     @pytest.mark.parametrize(
         ("options", "words"),
         [
             (("--columns", "colision"), "unknown column 'colision' (did you mean 'collision'?)"),
-            (("--csv", "table.txt"), "the output must be a file that ends in .csv"),
             (("--columns", "success", "--json"), "--columns is for tables"),
-            (("--csv", "-", "--json"), "--json and --csv - exclude each other"),
+            (("--markdown", "--json"), "--json and --markdown exclude each other"),
         ],
     )
     def test_bad_options_are_refused_before_any_work(self, run, monkeypatch, options, words):

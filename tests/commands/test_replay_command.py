@@ -1,6 +1,5 @@
-"""``kinarm-replay``: pages from policies, evaluations and recordings, and a live one."""
+"""``kinarm-replay``: pages from policies and recordings."""
 
-import json
 from dataclasses import replace as changed_to
 
 import numpy as np
@@ -17,6 +16,8 @@ from kinarm.problem import ReachProblem
 from kinarm.recording import load_recordings, save_recordings
 
 QUICK = ("--no-oracle",)
+EVALUATED = ("--problem", "right", "--trials", 12, "--seed", 4)
+"""The trials of the fixture ``evaluation``."""
 
 
 def played(answer):
@@ -34,10 +35,9 @@ def test_trials_of_a_policy(replay, policy_folder, tmp_path):
 
 
 def test_recordings_end_as_the_evaluation_says(run, tmp_path, evaluation, policy_folder):
-    options = ("--policy", policy_folder / "mine-seed0.npz", "--problem", "right")
-    settings = ("--trials", 12, "--seed", 4, *QUICK)
+    options = ("--policy", policy_folder / "mine-seed0.npz", *EVALUATED, *QUICK)
     files = ("--out", tmp_path / "made.html", "--record", tmp_path / "made.npz")
-    assert run("kinarm-replay", *options, *settings, *files).status == 0
+    assert run("kinarm-replay", *options, *files).status == 0
     said = outcomes_of(evaluation, "mine-seed0")
     recorded = load_recordings(tmp_path / "made.npz")
     assert [each.final_distance for each in recorded] == said["final_distance"]
@@ -49,7 +49,7 @@ def test_recordings_end_as_the_evaluation_says(run, tmp_path, evaluation, policy
 
 def test_the_worst_of_an_evaluation(replay, evaluation):
     distances = np.array(outcomes_of(evaluation, "random")["final_distance"])
-    answer = replay(evaluation, "--policy", "random", "--worst", 3, *QUICK)
+    answer = replay("random", *EVALUATED, "--worst", 3, *QUICK)
     assert played(answer) == np.argsort(-distances, kind="stable")[:3].tolist()
 
 
@@ -86,8 +86,6 @@ def test_two_policies_on_the_same_trials(replay, tmp_path):
         (("--policy", "zero", "--compare", "zero", "random"), ["--policy", "--compare"]),
         (("--policy", "zero", "--worst", "3", "--failures"), ["--worst", "--failures"]),
         (("--policy", "zero", "--problem", "left", "--trial", "200"), ["no trial 200", "0 to 199"]),
-        (("--policy", "zero", "--problem", "left", "--port", "7001"), ["--live"]),
-        (("--policy", "zero", "--problem", "left", "--live"), ["--out", "--live"]),
         (("--policy", "oracle", "--problem", "left", "--failures", "--trials", "9"), ["none of"]),
         (("--policy", "zero", "--problem", "left", "--failures"), ["10000 of 10000", "--trials"]),
         (("missing.npz",), ["missing.npz", "No such file"]),
@@ -122,7 +120,7 @@ def test_a_page_of_kinarm_with_the_default_name_is_replaced(run, tmp_path, monke
     check_refused(run("kinarm-replay", *options), "--overwrite")
 
 
-def test_a_policy_needs_no_option(run, replay, policy_folder, evaluation, tmp_path):
+def test_a_policy_needs_no_option(run, replay, policy_folder, tmp_path):
     mine, few = policy_folder / "mine-seed0.npz", ("--trials", 1, *QUICK)
     for number, words in enumerate([("--policy", mine, *few), (mine, *few), (*few, mine)]):
         assert run("kinarm-replay", *words, "--out", tmp_path / f"{number}.html").status == 0
@@ -157,27 +155,6 @@ def test_recordings_are_compared_in_the_same_trials_only(replay, recordings, tmp
     assert played(replay(mixed, "--compare", "mine-seed0", "other")) == [0, 0]
 
 
-@pytest.mark.parametrize(
-    ("change", "told"),
-    [
-        (lambda d: d["protocol"]["problems"]["right"]["goals"].reverse(), "hash"),
-        (lambda d: d["results"][1]["outcomes"]["steps"].reverse(), "ends otherwise"),
-    ],
-)
-def test_an_evaluation_that_no_longer_holds(replay, evaluation, tmp_path, change, told):
-    document = json.loads(evaluation.read_text())
-    assert document["results"][1]["policy"] == "random"
-    change(document)
-    (tmp_path / "evaluation.json").write_text(json.dumps(document))
-    check_refused(replay(tmp_path / "evaluation.json", "--policy", "random", *QUICK), told)
-
-
-def test_an_evaluation_of_several_policies(replay, evaluation):
-    check_refused(replay(evaluation, "--policy", "nobody"), "'nobody'", "random")
-    check_refused(replay(evaluation, "--policy", "mine-seed0"), "is a file: name it with --policy")
-    check_refused(replay(evaluation, "--policy", "random", "--problem", "left"), "'random'")
-
-
 class TestPlayground:
     def test_page_of_two_policies(self, run, policy_folder, tmp_path, monkeypatch):
         monkeypatch.chdir(tmp_path)
@@ -199,7 +176,6 @@ class TestPlayground:
             (("nobody",), "unknown policy 'nobody'"),
             ((PLAYED[0], "--compare", "zero", "zero"), "--compare does not go with --play"),
             ((PLAYED[0], "--wrapper", "a:b"), "--wrapper does not go with --play"),
-            ((PLAYED[0], "--live"), "--live does not go with --play"),
             ((PLAYED[0], "--plant", "hard"), "it has a plant with more than one delay"),
             ((PLAYED[0], "--arm", "paper_flange"), "was trained for arm 'paper', not for"),
         ],

@@ -42,14 +42,10 @@ def test_all_failures_in_groups_beside_the_oracle(replay, evaluation, policy_fol
     assert {each.outcome for each in ghosts} == {"success"}
 
 
-def test_failures_of_an_evaluation_and_of_recordings(replay, evaluation, recordings, tmp_path):
-    ends = outcomes_of(evaluation, "random")["outcome"]
-    failed = len(ends) - ends.count("success")
-    answer = replay(evaluation, "--policy", "random", "--failures", "--no-oracle")
-    assert answer.out.startswith(f"random: {failed} of 12 trials of right failed")
+def test_failures_of_recordings(replay, recordings):
     kept = load_recordings(recordings)
     missed = sum(each.outcome != "success" for each in kept)
-    answer = replay(recordings, "--failures", "--overwrite")
+    answer = replay(recordings, "--failures")
     if missed:
         assert f"{missed} of {len(kept)} trials of right failed" in answer.out
     else:

@@ -1,7 +1,6 @@
 """``kinarm-study`` as users run it."""
 
 import csv
-import io
 import json
 import signal
 import subprocess
@@ -52,7 +51,7 @@ def test_from_a_file_to_a_page(run, file, tmp_path, monkeypatch):
 
 
 @pytest.mark.parametrize("width", [80, 120])
-def test_rows_differ_and_csv_holds_all(run, file, tmp_path, monkeypatch, width):
+def test_rows_differ_and_files_hold_all(run, file, tmp_path, monkeypatch, width):
     monkeypatch.setenv("COLUMNS", str(width))
     monkeypatch.chdir(tmp_path)
     file.write_text(STUDY.replace("seeds = 3", "seeds = 1") + "noise = [0.0123456789, 0.987654]")
@@ -61,15 +60,16 @@ def test_rows_differ_and_csv_holds_all(run, file, tmp_path, monkeypatch, width):
     assert max(map(len, lines)) <= width
     for text in ("step_size=0.02", "noise=0.0123457", "noise=0.987654"):
         assert sum(text in line.split() for line in lines) == 2
-    asked = ("steps.toml", "--no-train", "--columns", "success,collision", "--csv", "-")
-    rows = list(csv.DictReader(io.StringIO(run("kinarm-study", *asked).out)))
-    pairs = {(float(row["step_size"]), float(row["noise"])) for row in rows}
-    assert pairs == {(a, b) for a in (0.02, 0.2) for b in (0.0123456789, 0.987654)}
+    answer = run("kinarm-study", "steps.toml", "--no-train", "--columns", "success,collision")
+    assert answer.out.split()[:4] == ["trainings", "success", "%", "collision"]
+    with (tmp_path / "steps" / "runs.csv").open() as file:
+        rows = list(csv.DictReader(file))
+    pairs = {(float(row["step_size"]), float(row["noise"])): row["success"] for row in rows}
+    assert pairs.keys() == {(a, b) for a in (0.02, 0.2) for b in (0.0123456789, 0.987654)}
     document = json.loads((tmp_path / "steps" / "results.json").read_text())
     for each in document["results"]:
-        (row,) = (row for row in rows if row["trainings"] == each["trainings"])
-        assert float(row["success"]) == each["success"]["value"]
-        assert [float(row[f"success_{end}"]) for end in ("low", "high")] == each["success"]["ci95"]
+        row = pairs[each["choices"]["step_size"], each["choices"]["noise"]]
+        assert float(row) == each["success"]["value"]
 
 
 def test_what_is_finished_can_be_written_without_training(run, file, tmp_path):

@@ -51,7 +51,7 @@ def test_each_policy_is_that_of_a_single_training(run, tmp_path, jobs):
     assert answer.status == 0, answer.err
     names = [NAME.format(seed) for seed in (3, 4, 5)]
     expected = [f"{name}{ending}" for name in names for ending in (".curve.csv", ".npz")]
-    assert sorted(path.name for path in folder.iterdir()) == expected
+    assert sorted(path.name for path in folder.glob("[!.]*")) == expected
     for seed, name in zip((3, 4, 5), names, strict=True):
         single = tmp_path / f"{seed}.npz"
         assert run("kinarm-train", *arguments, "--seed", seed, "--out", single).status == 0
@@ -63,7 +63,7 @@ def test_each_policy_is_that_of_a_single_training(run, tmp_path, jobs):
     assert f"kinarm-eval {folder}/" in then
 
 
-def test_resuming_finishes_each_seed_and_repeats_none(run, tmp_path, monkeypatch):
+def test_the_same_command_finishes_each_seed_and_repeats_none(run, tmp_path, monkeypatch):
     """Seed 0 is finished, seed 1 was interrupted, seed 2 has not begun."""
     monkeypatch.setattr(experiments, "CHECKPOINT_SECONDS", 0.0)
     arguments = ("ars", "--problem", "right", "--iterations", 9, *SMALL, "--seeds", 3)
@@ -81,18 +81,15 @@ def test_resuming_finishes_each_seed_and_repeats_none(run, tmp_path, monkeypatch
     answer = run("kinarm-train", *arguments, *options)
     assert answer.status == 130
     assert answer.err.splitlines()[-1] == (
-        "kinarm-train: interrupted: 1 of 3 seeds are finished; "
-        "the same command with --resume goes on"
+        "kinarm-train: interrupted: 1 of 3 seeds are finished; the same command goes on"
     )
     before = (tmp_path / f"{NAME.format(0)}.npz").read_bytes()
-    answer = run("kinarm-train", *arguments, *options)
-    assert (answer.status, answer.err.count("\n")) == (2, 1)
-    assert "go on with --resume" in answer.err
-    answer = run("kinarm-train", *arguments, *options, "--noise", 0.5, "--resume")
-    assert (answer.status, answer.err.count("\n")) == (2, 1)
-    assert "noise" in answer.err
+    for change in (("--noise", 0.5), ("--tolerance", 0.1, "--overwrite")):
+        answer = run("kinarm-train", *arguments, *options, *change)
+        assert (answer.status, answer.err.count("\n")) == (2, 1)
+        assert "is of the experiment 'ars-paper-right " in answer.err
     del resumed[:]
-    answer = run("kinarm-train", *arguments, *options, "--resume")
+    answer = run("kinarm-train", *arguments, *options)
     assert answer.status == 0, answer.err
     assert resumed[0] == (1, 5)
     assert (tmp_path / f"{NAME.format(0)}.npz").read_bytes() == before
@@ -100,14 +97,27 @@ def test_resuming_finishes_each_seed_and_repeats_none(run, tmp_path, monkeypatch
     for seed in range(3):
         made = Policy.load(tmp_path / f"{NAME.format(seed)}.npz")
         check_equal(made, train_policy(config(seed)).policy)
-    assert len(list(tmp_path.iterdir())) == 6
+    assert len(list(tmp_path.glob("[!.]*"))) == 6
+
+
+def test_a_policy_that_was_not_written_is_made_again_and_more_seeds_are_trained(run, tmp_path):
+    """A kill between training and policy leaves the training alone."""
+    arguments = ("ars", "--problem", "right", "--iterations", 9, *SMALL, "--out", tmp_path)
+    assert run("kinarm-train", *arguments, "--seeds", 1).status == 0
+    first = tmp_path / f"{NAME.format(0)}.npz"
+    before = first.read_bytes()
+    first.unlink()
+    assert run("kinarm-train", *arguments, "--seeds", 2, "--jobs", 1).status == 0
+    assert first.read_bytes() == before
+    check_equal(Policy.load(tmp_path / f"{NAME.format(1)}.npz"), train_policy(config(1)).policy)
+    answer = run("kinarm-train", *arguments, "--seeds", 2)
+    assert answer.out.count("finished earlier") == 2
 
 
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [
         (("--seeds", 2, "--seed", 1), "--seed and --seeds exclude each other"),
-        (("--seeds", 2, "--resume"), "nothing to resume"),
         (("--seeds", 2, "--out", "right.npz"), "with --seeds, --out is a folder: --out right"),
     ],
 )
@@ -119,37 +129,22 @@ def test_bad_options_are_one_line_and_nothing_is_written(run, tmp_path, argument
 
 
 def test_a_policy_in_the_way(run, tmp_path):
-    train_policy(config(1)).policy.save(tmp_path / f"{NAME.format(1)}.npz")
+    train_policy(config(1, noise=0.5)).policy.save(tmp_path / f"{NAME.format(1)}.npz")
     arguments = ("ars", "--problem", "right", "--iterations", 9, *SMALL, "--seeds", 2)
     answer = run("kinarm-train", *arguments, "--out", tmp_path)
     assert (answer.status, answer.err.count("\n")) == (2, 1)
     assert "--overwrite" in answer.err
-    for change in (("--noise", 0.5), ("--tolerance", 0.1)):
-        answer = run("kinarm-train", *arguments, *change, "--out", tmp_path, "--resume")
-        assert (answer.status, answer.err.count("\n")) == (2, 1)
-        assert change[0][2:] in answer.err
     assert [path.name for path in tmp_path.iterdir()] == [f"{NAME.format(1)}.npz"]
-
-
-def test_what_was_to_be_replaced_is_trained_anew(run, tmp_path):
-    """A policy with the settings that are asked for is finished, one with others is not."""
-    train_policy(config(1)).policy.save(tmp_path / f"{NAME.format(1)}.npz")
-    train_policy(config(0, noise=0.5)).policy.save(tmp_path / f"{NAME.format(0)}.npz")
-    before = (tmp_path / f"{NAME.format(0)}.npz").read_bytes()
-    arguments = ("ars", "--problem", "right", "--iterations", 9, *SMALL, "--noise", 0.5)
-    options = ("--seeds", 2, "--jobs", 1, "--resume", "--overwrite", "--out", tmp_path)
-    answer = run("kinarm-train", *arguments, *options)
+    answer = run("kinarm-train", *arguments, "--jobs", 1, "--out", tmp_path, "--overwrite")
     assert answer.status == 0, answer.err
-    assert (tmp_path / f"{NAME.format(0)}.npz").read_bytes() == before
-    made = Policy.load(tmp_path / f"{NAME.format(1)}.npz")
-    check_equal(made, train_policy(config(1, noise=0.5)).policy)
+    check_equal(Policy.load(tmp_path / f"{NAME.format(1)}.npz"), train_policy(config(1)).policy)
 
 
-def start(command, folder: Path, *extra: object) -> subprocess.Popen:
+def start(command, folder: Path) -> subprocess.Popen:
     """Begin a long training of three seeds, two at a time."""
     arguments = ("ars", "--problem", "right", "--iterations", 300, *SMALL, "--seeds", 3)
     return subprocess.Popen(
-        command("kinarm-train", *arguments, "--jobs", 2, "--out", folder, *extra),
+        command("kinarm-train", *arguments, "--jobs", 2, "--out", folder),
         cwd=ROOT,
         env={**os.environ, "COLUMNS": "100"},
         stdout=subprocess.PIPE,
@@ -174,7 +169,7 @@ def workers(process: subprocess.Popen) -> list[int]:
 def test_ctrl_c_and_lost_workers_keep_every_seed_and_say_how_to_go_on(command, tmp_path):
     folder = tmp_path / "right"
     process = start(command, folder)
-    while not (folder / ".training" / "study.toml").exists():
+    while not any(folder.glob(".training/*/study.toml")):
         assert process.poll() is None, process.stderr.read()
         time.sleep(0.02)
     process.send_signal(signal.SIGINT)
@@ -183,9 +178,9 @@ def test_ctrl_c_and_lost_workers_keep_every_seed_and_say_how_to_go_on(command, t
     assert "Traceback" not in errors
     last = errors.splitlines()[-1]
     assert last.startswith("kinarm-train: interrupted: ")
-    assert last.endswith("the same command with --resume goes on")
+    assert last.endswith("the same command goes on")
 
-    process = start(command, folder, "--resume")
+    process = start(command, folder)
     while process.poll() is None:
         for number in workers(process):
             with suppress(ProcessLookupError):
@@ -196,9 +191,9 @@ def test_ctrl_c_and_lost_workers_keep_every_seed_and_say_how_to_go_on(command, t
     assert "Traceback" not in errors
     last = errors.splitlines()[-1]
     assert last.startswith("kinarm-train: workers ended unexpectedly: ")
-    assert last.endswith("of 3 seeds are finished; the same command with --resume goes on")
+    assert last.endswith("of 3 seeds are finished; the same command goes on")
 
-    process = start(command, folder, "--resume")
+    process = start(command, folder)
     _, errors = process.communicate(timeout=300)
     assert process.returncode == 0, errors
     for seed in range(3):

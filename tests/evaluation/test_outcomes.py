@@ -16,6 +16,6 @@ def test_of_many_trials_the_first_are_bounded(skilled):
     many, first = (run_trials(mine, faced, bounds=bounds) for faced in (trials, few))
     for name in ("relative_success", "step_ratio", "step_ratio_p95"):
         assert many.metrics[name].value == first.metrics[name].value
-    faced = evaluation_document([many], "").faced("right")
+    faced = evaluation_document([many], "").protocol.problems["right"]
     assert faced.oracle.bounded == len(faced.oracle.trials.steps) == 12
     assert len(faced.starts) == 40

@@ -1,16 +1,28 @@
-"""Where a checked problem may start."""
+"""What a check finds, and where a checked problem may start."""
 
 import numpy as np
 
-from kinarm.evaluation.problem_check import random_starts
+from kinarm.evaluation.problem_check import check_problem, random_starts
 from kinarm.problem import PROBLEMS
 from kinarm.world import World
+
+
+def test_the_papers_third_task():
+    check = check_problem(World("both"), trials=20)
+    assert check.reached.value == 1
+    assert check.home_contact is None
+    # FACTS of the arm: about 72 % of uniform configurations are free.
+    low, high = check.free_starts.ci95
+    assert low < 0.72 < high
+    assert len(check.touching) == 28
+    assert not any(check.mirror.values())
 
 
 def test_where_starts_are_listed_these_are_checked():
     listed = ((0.0,) * 6, (0.5, 0.0, 0.0, 0.0, 0.0, 0.0))
     world = World(PROBLEMS["right"].replace(starts=listed))
     np.testing.assert_array_equal(random_starts(world), listed)
+    assert " of 2; at home nothing touches" in str(check_problem(world, trials=1))
 
 
 def test_elsewhere_starts_lie_between_home_and_the_limits():

@@ -125,6 +125,11 @@ class TestRequests:
 
 
 class TestPorts:
+    def test_this_machine_alone_is_served(self, server):
+        """127.0.0.2 is this machine too, and would answer if every interface were bound."""
+        with socket.socket() as probe:
+            assert probe.connect_ex(("127.0.0.2", server.port)) != 0
+
     def test_the_next_free_one(self, server):
         with LiveServer(server.port) as other:
             assert other.port > server.port

@@ -1,13 +1,12 @@
 """Experiment files: what they can say, which trainings they plan, and what is refused."""
 
-import math
 from dataclasses import replace
 
 import pytest
 
 from kinarm.errors import InvalidInputError, KinarmError
 from kinarm.evaluation.experiments.experiment import Experiment
-from kinarm.evaluation.experiments.plan import _changed_problem, drawn_choices, plan
+from kinarm.evaluation.experiments.plan import _changed_problem, plan
 from kinarm.policies.recipes import recipe
 from kinarm.problem import PROBLEMS, ReachProblem
 
@@ -26,12 +25,6 @@ reward.success = 2.0
 [grid]
 step_size = [0.01, 0.05]
 "problem.task.start_spread" = [0.2, 1.0]
-
-[random]
-count = 4
-noise = { low = 0.001, high = 0.1, log = true }
-problem.task.horizon = { low = 10, high = 12 }
-episodes = [1, 2]
 """
 
 
@@ -61,31 +54,9 @@ class TestFile:
 
 class TestChoices:
     def test_every_value_with_every_other(self, experiment):
-        choices = list(drawn_choices(experiment))
-        assert len(choices) == 2 * 2 * 4
-        grid = {(c["step_size"], c["problem.task.start_spread"]) for c in choices}
-        assert grid == {(0.01, 0.2), (0.01, 1.0), (0.05, 0.2), (0.05, 1.0)}
-
-    def test_draws_are_the_same_for_every_value_of_the_grid(self, experiment):
-        choices = list(drawn_choices(experiment))
-        assert [c["noise"] for c in choices[:4]] == [c["noise"] for c in choices[4:8]]
-
-    def test_more_draws_begin_with_the_same_ones(self):
-        entries = {"noise": {"low": 0.0, "high": 1.0}, "seed": 3}
-        few, many = (list(drawn_choices(made(random={"count": n, **entries}))) for n in (3, 20))
-        assert many[:3] == few
-        assert len({c["noise"] for c in many}) == 20
-
-    def test_draws_fill_their_range(self):
-        ranges = {"low": 1, "high": 3}, {"low": 0.001, "high": 10.0, "log": True}
-        entries = {"count": 400, "episodes": ranges[0], "noise": ranges[1], "size": ["a", "b"]}
-        drawn = list(drawn_choices(made(random=entries)))
-        assert {c["episodes"] for c in drawn} == {1, 2, 3}
-        assert {c["size"] for c in drawn} == {"a", "b"}
-        logs = sorted(math.log10(c["noise"]) for c in drawn)
-        assert -3 <= logs[0] < -2.9
-        assert 0.9 < logs[-1] <= 1
-        assert logs[200] == pytest.approx(-1, abs=0.4)
+        choices = [run.choices for run in plan(replace(experiment, problems=("right",), seeds=1))]
+        grid = [(each["step_size"], each["problem.task.start_spread"]) for each in choices]
+        assert grid == [(0.01, 0.2), (0.01, 1.0), (0.05, 0.2), (0.05, 1.0)]
 
 
 TOY = {"learner": "ars", "recipe": "tuned"}
@@ -103,8 +74,8 @@ TOY = {"learner": "ars", "recipe": "tuned"}
         ({"problems": ["right", "right"]}, "problems names the same twice: right, right"),
         ({"grid": {"noise": []}}, "grid.noise must be a list of at least one value, got []"),
         ({"grid": {"noise": [1]}, "fixed": {"noise": 1}}, "'noise' stands in fixed and in grid"),
-        ({"random": {"count": 1, "noise": {"low": 1, "high": 1}}}, "low below high"),
-        ({"random": {"count": 1, "noise": {"low": 0, "high": 2, "log": True}}}, "low is above 0"),
+        ({"search": {"count": 1, "noise": {"low": 1, "high": 1}}}, "low below high"),
+        ({"search": {"count": 1, "noise": {"low": 0, "high": 2, "log": True}}}, "low is above 0"),
         (
             {"trials": {"cuont": 5}},
             "unknown key 'trials.cuont' (did you mean 'count'?); available: count",

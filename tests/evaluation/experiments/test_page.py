@@ -7,11 +7,7 @@ import numpy as np
 import pytest
 from small_studies import SMALL
 
-from kinarm.evaluation.experiments.page import (
-    draw_all,
-    effects,
-    write_all,
-)
+from kinarm.evaluation.experiments.page import learning_curves, write_all
 from kinarm.evaluation.experiments.study import Study
 from kinarm.evaluation.experiments.table import group_entries, group_row
 from kinarm.evaluation.statistics import Estimate, share_difference
@@ -46,9 +42,6 @@ class TestTable:
         rows = study.rows()
         assert [row["sharing"] for row in rows] == ["none", "pair", None]
         assert [row["n_epochs"] for row in rows] == [None, None, 1]
-        panels = {axes.get_title(): axes for axes in effects(study).axes}
-        assert [text.get_text() for text in panels["sharing"].get_xticklabels()] == ["none", "pair"]
-        assert set(panels) == {"learner", "sharing"}
 
 
 class TestGroups:
@@ -97,31 +90,12 @@ class TestFiles:
         for group in finished.groups():
             for cell in group_row(group):
                 assert cell in page
-        for name in ("learning_curves", "effects"):
-            assert f'<section id="{name}">' in page
-            assert (folder / f"{name}.png").stat().st_size > 5000
-            assert (folder / f"{name}.svg").stat().st_size > 5000
+        assert '<section id="learning_curves">' in page
+        assert (folder / "learning_curves.png").stat().st_size > 5000
+        assert (folder / "learning_curves.svg").stat().st_size > 5000
 
-
-class TestFigures:
-    def test_nothing_varies(self, small):
+    def test_without_points_there_is_no_figure(self, small):
         study = small(grid={}, seeds=1, trials={"count": 5, "per_decade": 0}).run(jobs=1)
-        assert draw_all(study) == {}
-
-    def test_effects_are_means_over_the_rest(self, finished):
-        (axes,) = effects(finished).axes
-        drawn = {
-            line.get_xdata()[0]: line.get_ydata()[0]
-            for line in axes.lines
-            if line.get_marker() == "o"
-        }
-        for group in finished.groups():
-            assert drawn[group.choices["step_size"]] == pytest.approx(group.hits.mean())
-
-    def test_what_is_drawn_at_random_is_shown_training_by_training(self, small):
-        ranges = {"count": 3, "step_size": {"low": 0.01, "high": 0.1}}
-        study = small(grid={}, random=ranges, seeds=1).run(jobs=1)
-        (axes,) = effects(study).axes
-        assert sorted(line.get_xdata()[0] for line in axes.lines) == sorted(
-            row["step_size"] for row in study.rows()
-        )
+        assert learning_curves(study) is None
+        assert "learning_curves" not in write_all(study).read_text()
+        assert not (study.store.folder / "learning_curves.png").exists()

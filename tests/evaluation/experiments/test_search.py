@@ -7,7 +7,10 @@ from small_studies import SMALL
 
 from kinarm.errors import InvalidInputError, MissingExtraError
 from kinarm.evaluation.experiments import search as searches
+from kinarm.evaluation.experiments import study as studies
+from kinarm.evaluation.experiments.executors import LocalExecutor
 from kinarm.evaluation.experiments.experiment import Experiment
+from kinarm.evaluation.experiments.runs import train
 from kinarm.evaluation.experiments.search import _open_search, recipe_entries
 from kinarm.evaluation.experiments.study import Study
 from kinarm.policies import recipe
@@ -21,7 +24,6 @@ SEARCH = {
     "seeds": 1,
     "search": {
         "count": 6,
-        "pruner": "none",
         "step_size": {"low": 0.01, "high": 0.5, "log": True},
         "sharing": ["none", "pair"],
         "episodes": {"low": 1, "high": 2},
@@ -93,16 +95,34 @@ class TestSearch:
             if trial not in complete:
                 assert "top_directions must be at most" in trial.user_attrs["error"]
 
-    def test_poor_trainings_are_broken_off(self, tmp_path, monkeypatch):
-        class Strict(optuna.pruners.NopPruner):
-            def prune(self, study, trial):
-                return trial.number % 2 == 1 and len(trial.intermediate_values) == 1
+    def test_trainings_that_fail_are_replaced_by_others(self, tmp_path, monkeypatch):
+        failed = []
 
-        monkeypatch.setattr(optuna.pruners, "MedianPruner", Strict)
-        entries = {name: entry for name, entry in SEARCH["search"].items() if name != "pruner"}
-        study = Study({**SEARCH, "search": entries}, tmp_path).run(jobs=1)
-        assert states(study) == ["COMPLETE", "PRUNED"] * 3
-        assert len(study) == 3
+        def once(task, *arguments, **options):
+            if not failed:
+                failed.append(task.run)
+                raise InvalidInputError("it does not work")
+            return train(task, *arguments, **options)
+
+        monkeypatch.setattr(studies, "train", once)
+        study = Study(SEARCH, tmp_path).run(jobs=1)
+        assert states(study) == ["FAIL"] + ["COMPLETE"] * 6
+        trial = _open_search(study.experiment, tmp_path).trials[0]
+        assert trial.user_attrs["error"] == "it does not work"
+        assert study.failures == {}
+
+    def test_as_many_at_a_time_as_there_are_jobs(self, tmp_path):
+        counts = []
+
+        class Counting(LocalExecutor):
+            def map(self, work, tasks):
+                counts.append(len(tasks))
+                return super().map(work, tasks)
+
+        entries = {**SEARCH, "seeds": 2, "search": {**SEARCH["search"], "count": 5}}
+        study = Study(entries, tmp_path).run(jobs=2, executor=Counting(1))
+        assert states(study) == ["COMPLETE"] * 5
+        assert counts == [4, 4, 2, 0]
 
 
 @pytest.mark.parametrize(
