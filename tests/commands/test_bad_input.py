@@ -19,6 +19,8 @@ ARMS = ", ".join(arm_names())
         ("--trials 0", ["trials", "at least 1, got 0"]),
         ("--seed -1", ["seed", "at least 0, got -1"]),
         ("stray", ["stray"]),
+        ("--policy ars-tuned-both-seed0 --arm paper_flange", ["'paper_flange'", "'paper'"]),
+        ("--vec-normalize none", ["--vec-normalize", "models of Stable-Baselines3"]),
         ("--json --markdown", ["exclude each other"]),
     ],
 )
