@@ -6,20 +6,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from kinarm.errors import InvalidInputError, OutputError
 from kinarm.evaluation.bounds import oracle_bounds
 from kinarm.evaluation.contestants import ORACLE, Contestant
 from kinarm.evaluation.evaluation import run_trials
 from kinarm.evaluation.metrics import METRICS
-from kinarm.evaluation.report.card import (
-    check_card,
-    policy_card,
-    shown_trials,
-    write_card,
-)
+from kinarm.evaluation.report.card import policy_card, write_card
 from kinarm.evaluation.summary import evaluation_document
 from kinarm.policies import load_policy
-from kinarm.problem import PROBLEMS
 
 
 @pytest.fixture(scope="module")
@@ -96,42 +89,8 @@ def test_how_to_use_it_runs(card, document, faced, tmp_path, monkeypatch):
     assert (tmp_path / "mine.html").stat().st_size > 1e5
 
 
-def test_the_replay_shows_the_first_trials_and_the_worst(faced):
-    rollouts = faced[0].rollouts
-    shown = shown_trials(faced[0])
-    assert shown[:3] == [0, 1, 2]
-    assert len(set(shown)) == 6
-    left = sorted(set(range(60)) - set(shown))
-    assert not rollouts.success[shown[3:]].any() or rollouts.success[left].all()
-
-
 def test_without_the_oracle(faced, document):
     alone = replace(faced[0], bounds=None)
     text = policy_card("mine", evaluation_document([alone], "made"), alone)
     assert "oracle" not in text
     assert "| | this policy |\n| --- | --- |\n" in text
-
-
-class TestCheck:
-    @pytest.fixture
-    def mine(self, skilled):
-        return Contestant.from_policy("mine", skilled), PROBLEMS["right"]
-
-    @pytest.mark.parametrize("count", [2, 5])
-    def test_several_policies_are_refused(self, mine, tmp_path, count):
-        with pytest.raises(InvalidInputError, match="one trained policy.*got mine on right, mine"):
-            check_card(tmp_path / "mine.md", [mine] * count)
-
-    def test_what_exists_is_kept(self, mine, tmp_path):
-        for name in ("mine.md", "mine.html", "mine.npz"):
-            (tmp_path / name).write_text("old")
-            with pytest.raises(OutputError, match=f"{name}' exists: --overwrite"):
-                check_card(tmp_path / "mine.md", [mine])
-            check_card(tmp_path / "mine.md", [mine], overwrite=True)
-            (tmp_path / name).unlink()
-
-    def test_the_policy_s_own_file_may_lie_there(self, mine, tmp_path):
-        contestant, problem = mine
-        contestant.policy.save(tmp_path / "mine.npz")
-        there = replace(contestant, source=(tmp_path / "mine.npz").resolve())
-        check_card(tmp_path / "mine.md", [(there, problem), (ORACLE, problem)])
