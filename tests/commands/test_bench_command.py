@@ -1,13 +1,11 @@
 """``kinarm-bench``: JSON alone, a table or files, from the same figures."""
 
 import json
-from functools import partial
 
 import pytest
 from refusals import check_refused
 
 from kinarm.evaluation import bench
-from kinarm.policies import recipe
 
 EVALUATION = {
     "seconds_first": 23.4,
@@ -52,22 +50,6 @@ FIGURES = (
 )
 
 
-def test_json_alone_is_printed(run, policy_folder, monkeypatch):
-    for name in ("BATCHES", "VECTOR_ENVS", "ORACLE_TRIALS", "REFERENCE_TRIALS"):
-        monkeypatch.setattr(bench, name, (512,) if name == "BATCHES" else 2)
-    monkeypatch.setattr(bench, "measure_evaluation", lambda: EVALUATION)
-    monkeypatch.setattr(bench, "recipe", partial(recipe, iterations=2))
-    path = policy_folder / "mine-seed0.npz"
-    answer = run("kinarm-bench", "--json", "--repetitions", 1, "--policy", path)
-    document = json.loads(answer.out)
-    assert (answer.status, answer.err) == (0, "")
-    assert set(DOCUMENT) - set(document) == {"ppo_training"}
-    assert document["policy"] == str(path)
-    assert document["oracle"]["trials_per_second"]["median"] > 0
-    fast = document["rollouts"][-1]["steps_per_second"]["median"]
-    assert document["speed_up_over_reference"] == fast / document["reference"]["median"]
-
-
 @pytest.fixture
 def asked(monkeypatch):
     """Nothing is measured; what was asked for is listed."""
@@ -82,6 +64,7 @@ def test_table_and_files_show_every_figure(run, asked, tmp_path):
     page = (tmp_path / "speed" / "SPEED.md").read_text()
     for shown in (page, " ".join(answer.out.split())):
         assert not [figure for figure in FIGURES if figure not in shown]
+    assert json.loads(run("kinarm-bench", "--json").out) == DOCUMENT
     made = json.loads((tmp_path / "speed" / "speed.json").read_text())
     assert made.pop("command") in page
     assert made == DOCUMENT
