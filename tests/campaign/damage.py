@@ -52,11 +52,6 @@ def damaged_bytes(content: bytes, rng: Rng) -> bytes:
     return bytes(spoilt)
 
 
-def cut_bytes(content: bytes, rng: Rng) -> bytes:
-    """Cut the end off: what damages a pickle without making another one of it."""
-    return content[: int(rng.integers(len(content)))]
-
-
 def damaged_text(content: bytes, rng: Rng) -> bytes:
     """Exchange words, drop or repeat lines, nest without end, or damage bytes."""
     kind = int(rng.integers(6))

@@ -125,9 +125,12 @@ def unfit(command: str, status: int | None, err: str, statuses: tuple[int, ...])
 
 
 def arrays(folder: Path) -> dict[str, bytes]:
-    """What a training or a study made: arrays of archives, without headers, which tell of times."""
+    """What a training or a study made: arrays of archives, without what tells of times.
+
+    These are headers, and where the trainings of a study ended.
+    """
     made = {}
-    for path in folder.rglob("*.npz"):
+    for path in (each for each in folder.rglob("*.npz") if each.parent.name != "ends"):
         with np.load(path) as archive:
             for name in set(archive.files) - {"header"}:
                 made[f"{path.relative_to(folder)} {name}"] = archive[name].tobytes()

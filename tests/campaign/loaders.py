@@ -1,4 +1,4 @@
-"""Every loader, fed with damaged files: refused in one line, or read; nothing else comes of it.
+"""Loaders, fed with damaged files: refused in one line, or read; nothing else comes of it.
 
 ``python -m tests.campaign.loaders --count 100000 --out data/results/campaign/loaders.json``
 """
@@ -6,7 +6,6 @@
 import multiprocessing
 import os
 import resource
-import sys
 import tempfile
 import traceback
 import warnings
@@ -21,21 +20,17 @@ import numpy as np
 
 from kinarm.arm import Arm
 from kinarm.errors import KinarmError
-from kinarm.evaluation import EvaluationDocument, Study, oracle_bounds
-from kinarm.evaluation.finding import find_contestants
+from kinarm.evaluation import EvaluationDocument, Study
 from kinarm.meshes import hulls_of_mesh
-from kinarm.policies import Demonstrations, Policy, load_checkpoint, recipe
-from kinarm.policies.conversion.models import load_vec_normalize, sb3_model
-from kinarm.policies.learners import state_policy
+from kinarm.policies import Policy
+from kinarm.policies.conversion.models import sb3_model
 from kinarm.problem import ReachProblem
-from kinarm.problem_files import find_scene, find_task
 from kinarm.recording import load_recordings
 from kinarm.viewer.visual_shapes import read_mesh_file, visual_parts
 
 from . import samples
 from .damage import (
     Damage,
-    cut_bytes,
     damaged_archive,
     damaged_bytes,
     damaged_json,
@@ -89,11 +84,6 @@ def _policy(path: Path) -> None:
     policy.check_arm(samples.trials().simulator.arm)
 
 
-def _checkpoint(path: Path) -> None:
-    checkpoint = load_checkpoint(path)
-    state_policy(checkpoint.config, checkpoint.state)
-
-
 def _evaluation(path: Path) -> None:
     for faced in EvaluationDocument.load(path).protocol.problems.values():
         ReachProblem.from_json(faced.problem)
@@ -103,39 +93,6 @@ def _arm(path: Path) -> None:
     arm = Arm.load(path)
     assert arm.reach > 0
     list(visual_parts(arm))
-
-
-def _bounds(path: Path) -> None:
-    """Bounds are looked up in the cache; damaged ones are made anew."""
-    os.environ["KINARM_CACHE"] = str(path.parent / "cache")
-    kept = next((path.parent / "cache").glob("oracle-*"), None)
-    if kept is not None:
-        kept.write_bytes(path.read_bytes())
-    oracle_bounds(samples.trials())
-
-
-def _bounds_samples() -> list[bytes]:
-    def save(path: Path) -> None:
-        path.touch()
-        _bounds(path)
-        next((path.parent / "cache").glob("oracle-*")).rename(path)
-
-    return [samples.written(save)]
-
-
-def _study(path: Path) -> None:
-    """Read everything that lies in the folder of a study."""
-    study = Study(samples.SMALL_STUDY, path.parents[1])
-    study.rows()
-    study.store.made(study.runs[0])
-    assert len(study.bounds) <= 1
-
-
-def _module(path: Path) -> None:
-    sys.modules.pop("mine", None)
-    sys.path[0], sys.dont_write_bytecode = str(path.parent), True
-    with warnings.catch_warnings(action="ignore"):  # they are the module's own
-        find_contestants("mine:act")
 
 
 def _mesh(read: Callable[[Path, np.ndarray], object], path: Path) -> None:
@@ -149,22 +106,12 @@ def _cube() -> dict[str, bytes]:
 
 LOADERS: dict[str, Loader] = {
     "policy": Loader(samples.policies, damaged_archive, _policy),
-    "checkpoint": Loader(samples.checkpoints, damaged_archive, _checkpoint),
     "recordings": Loader(samples.recordings, damaged_archive, load_recordings),
-    "demonstrations": Loader(samples.demonstrations, damaged_archive, Demonstrations.load),
-    "bounds": Loader(_bounds_samples, damaged_archive, _bounds),
     "evaluation": Loader(samples.evaluations, damaged_json, _evaluation, "file.json"),
     "problem": Loader(
-        partial(samples.toml_files, "problems"),
+        samples.problems,
         damaged_toml,
         lambda path: ReachProblem.load(path).to_toml(),
-        "file.toml",
-    ),
-    "scene": Loader(partial(samples.toml_files, "scenes"), damaged_toml, find_scene, "file.toml"),
-    "task": Loader(
-        lambda: [b'goal_regions = ["right"]\nhorizon = 64\n[reward]\nsuccess = 1.0\n'],
-        damaged_toml,
-        find_task,
         "file.toml",
     ),
     "arm file": Loader(
@@ -174,30 +121,20 @@ LOADERS: dict[str, Loader] = {
         "file.toml",
         lambda: {"paper.urdf": samples.urdf()},
     ),
-    "recipe": Loader(samples.recipes, damaged_toml, lambda path: recipe("ars", path), "file.toml"),
     "study": Loader(
         lambda: [samples.STUDY],
         damaged_toml,
         lambda path: repr(Study(path, path.parent / "out")),
         "file.toml",
     ),
-    "made of a study": Loader(samples.study_record, damaged_json, _study, f"made/{samples.MADE}"),
     "urdf": Loader(
         lambda: [*[samples.SMALL_URDF] * 7, samples.urdf()], damaged_xml, _arm, "file.urdf", _cube
     ),
-    "module": Loader(lambda: [samples.MODULE], damaged_text, _module, "mine.py"),
     "model of Stable-Baselines3": Loader(
         lambda: [samples.written(samples.sb3_model().save, "model.zip")],
         damaged_bytes,
         sb3_model,
         "file.zip",
-        needs="stable_baselines3",
-    ),
-    "VecNormalize": Loader(
-        lambda: [samples.written(samples.sb3_model().get_env().save, "statistics.pkl")],
-        cut_bytes,
-        load_vec_normalize,
-        "file.pkl",
         needs="stable_baselines3",
     ),
 }
@@ -265,7 +202,6 @@ def _work(
     """Load files from a number on, and tell what came of each."""
     loader, (first, count, seed) = LOADERS[name], numbers
     path = folder / loader.file
-    path.parent.mkdir(exist_ok=True)
     for other, content in loader.beside().items():
         (folder / other).write_bytes(content)
     path.write_bytes(contents[0])

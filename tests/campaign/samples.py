@@ -10,9 +10,8 @@ import numpy as np
 
 from kinarm._files import shipped_files
 from kinarm.arm import Arm
-from kinarm.evaluation import EvaluationRequest, Study, TrialSet
-from kinarm.policies import Oracle, load_policy, recipe, save_checkpoint
-from kinarm.policies.learners import training_states
+from kinarm.evaluation import EvaluationRequest, TrialSet
+from kinarm.policies import load_policy
 from kinarm.recording import record_rollouts, save_recordings
 from tests.helpers.mesh_files import CUBE_CORNERS, CUBE_FACES, write_obj, write_stl
 
@@ -33,16 +32,6 @@ def policies() -> list[bytes]:
     return [written(load_policy(name).save) for name in names]
 
 
-def checkpoints() -> list[bytes]:
-    """Of Augmented Random Search and of PPO, before the first iteration."""
-    found = []
-    for learner in ("ars", "ppo"):
-        config = recipe(learner, "paper", iterations=3)
-        state = next(training_states(config))
-        found.append(written(lambda path, c=config, s=state: save_checkpoint(path, c, s)))
-    return found
-
-
 @cache
 def trials() -> TrialSet:
     """Three trials."""
@@ -55,11 +44,6 @@ def recordings() -> list[bytes]:
     rollouts = simulator.rollout(policy, trials().starts, trials().goals, record=True)
     recorded = record_rollouts(simulator, rollouts, "ars")
     return [written(lambda path: save_recordings(path, recorded))]
-
-
-def demonstrations() -> list[bytes]:
-    """Of three trials."""
-    return [written(Oracle("right").demonstrations(3).save)]
 
 
 def evaluations() -> list[bytes]:
@@ -79,24 +63,15 @@ def evaluations() -> list[bytes]:
         return [save(Path(name) / str(oracle), oracle) for oracle in (True, False)]
 
 
-def toml_files(folder: str) -> list[bytes]:
-    """Files that ship."""
-    return [path.read_bytes() for path in shipped_files(folder).values() if path.suffix == ".toml"]
+def problems() -> list[bytes]:
+    """Problem files that ship."""
+    return [path.read_bytes() for path in shipped_files("problems").values()]
 
 
 def arm_files() -> list[bytes]:
     """An arm of kinarm's and one of another package."""
     arms = shipped_files("arms")
     return [arms[name].read_bytes() for name in ("paper", "ur5")]
-
-
-def recipes() -> list[bytes]:
-    """Recipe files."""
-    return [
-        b'base = "tuned"\niterations = 20\nstep_size = 0.05\nproblem = "left"\n'
-        b"[reward]\nsuccess = 0.5\ncollision = -2.0\n",
-        b'noise = 0.1\nsharing = "pair"\nnet_arch = [8, 8]\nnormalize = false\n',
-    ]
 
 
 STUDY = b"""
@@ -116,22 +91,6 @@ step_size = [0.01, 0.02]
 "problem.task.start_spread" = [0.2]
 sharing = ["none", "pair"]
 """
-
-SMALL_STUDY = {
-    "name": "small",
-    "trials": {"count": 5},
-    "fixed": {"iterations": 1, "directions": 2, "top_directions": 1},
-}
-MADE = Study(SMALL_STUDY, Path()).store.path("made", Study(SMALL_STUDY, Path()).runs[0]).name
-"""Name of the file that tells how the one training of this study was made."""
-
-
-def study_record() -> list[bytes]:
-    """This file."""
-    with TemporaryDirectory() as name:
-        Study(SMALL_STUDY, name).run(jobs=1)
-        return [(Path(name) / "made" / MADE).read_bytes()]
-
 
 SMALL_URDF = b"""<?xml version="1.0" encoding="utf-8"?>
 <robot name="made" version="1.2">
@@ -194,24 +153,11 @@ def dae() -> bytes:
     ).encode()
 
 
-@cache
 def sb3_model() -> Any:
-    """A small model of Stable-Baselines3 and its environment with statistics."""
+    """A small model of Stable-Baselines3."""
     from stable_baselines3 import PPO
-    from stable_baselines3.common.vec_env import DummyVecEnv, VecNormalize
 
     from kinarm.envs import ReachEnv
 
-    env = VecNormalize(DummyVecEnv([lambda: ReachEnv("right")]))
     settings = {"n_steps": 8, "batch_size": 8, "policy_kwargs": {"net_arch": [4]}}
-    return PPO("MlpPolicy", env, device="cpu", **settings)
-
-
-MODULE = b"""import numpy as np
-
-WEIGHTS = np.ones((5, 48)) / 48
-
-
-def act(observations):
-    return np.clip(observations @ WEIGHTS.T, -1, 1)
-"""
+    return PPO("MlpPolicy", ReachEnv("right"), device="cpu", **settings)

@@ -9,9 +9,6 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-from numpy.typing import ArrayLike
-
 EXAMPLES = 5
 """Failures of each kind that are described."""
 
@@ -24,58 +21,34 @@ class Tally:
     ----------
     counts : dict of int
         Sizes, such as how many steps were taken, by their name.
-    checked, failed : dict of int
-        How often each claim was checked, and how often it did not hold.
+    failed : dict of int
+        How often something was wrong, by what it was.
     examples : list of dict
         Some failures, with what it takes to repeat them.
     """
 
     counts: dict[str, int] = field(default_factory=dict)
-    checked: dict[str, int] = field(default_factory=dict)
     failed: dict[str, int] = field(default_factory=dict)
     examples: list[dict[str, Any]] = field(default_factory=list)
 
-    def count(self, what: str, number: int = 1) -> None:
-        """Add to a size."""
-        self.counts[what] = self.counts.get(what, 0) + int(number)
+    def count(self, what: str) -> None:
+        """Count one more."""
+        self.counts[what] = self.counts.get(what, 0) + 1
 
     def find(self, what: str, **example: Any) -> None:
         """Note something that is wrong."""
-        self.check(what, False, lambda _: example)
-
-    def check(
-        self,
-        claim: str,
-        holds: ArrayLike,
-        describe: Callable[[int], dict[str, Any]] = lambda _: {},
-    ) -> None:
-        """Note for which of many cases a claim holds.
-
-        Parameters
-        ----------
-        claim : str
-            What is claimed.
-        holds : array_like of bool
-            Whether it does.
-        describe : callable
-            From the number of a case to what JSON can hold of it.
-        """
-        verdicts = np.atleast_1d(holds)
-        wrong = np.flatnonzero(~verdicts)
-        self.checked[claim] = self.checked.get(claim, 0) + verdicts.size
-        before = self.failed.get(claim, 0)
-        self.failed[claim] = before + wrong.size
-        for index in wrong[: max(EXAMPLES - before, 0)].tolist():
-            self.examples.append({"claim": claim, "case": index, **describe(index)})
+        self.failed[what] = self.failed.get(what, 0) + 1
+        if self.failed[what] <= EXAMPLES:
+            self.examples.append({"finding": what, **example})
 
 
-def table(rows: Mapping[str, Mapping[str, int]], what: str = "") -> str:
+def table(rows: Mapping[str, Mapping[str, int]]) -> str:
     """Numbers of some parts in Markdown, one row a part, and their sums."""
     columns = list(dict.fromkeys(name for row in rows.values() for name in row))
     cells = {name: [row.get(column, 0) for column in columns] for name, row in rows.items()}
     if len(rows) > 1:
         cells["**all**"] = [sum(column) for column in zip(*cells.values(), strict=True)]
-    lines = [[what, *columns], ["---"] * (1 + len(columns))]
+    lines = [["", *columns], ["---"] * (1 + len(columns))]
     lines += [[name, *(f"{number:,}" for number in row)] for name, row in cells.items()]
     return "".join(f"| {' | '.join(line)} |\n" for line in lines)
 

@@ -1,8 +1,6 @@
-"""A few kills, signals and failing writes, and several processes on one folder."""
+"""A few kills, signals and failing writes, and commands in strange surroundings."""
 
 import pytest
-
-from kinarm._files import only_writer
 
 from . import disturbances
 from .disturbances import EVALUATED, STUDIED, TRAIN, ended, started, unfit
@@ -15,6 +13,7 @@ pytestmark = pytest.mark.rare
     ("disturb", "command", "count"),
     [
         ("kill", TRAIN, 1),
+        ("kill", STUDIED, 1),
         ("interrupt", STUDIED, 1),
         ("limit", EVALUATED, 2),
     ],
@@ -24,16 +23,6 @@ def test_nothing_is_lost_or_left(disturb, command, count):
     getattr(disturbances, disturb)(command, count, 0, tally)
     assert tally.failed == {}, tally.examples
     assert sum(tally.counts.values()) >= count
-
-
-@pytest.mark.parametrize("command", [EVALUATED, STUDIED])
-def test_one_process_at_a_time_writes_to_a_folder(command, tmp_path):
-    (tmp_path / "out").mkdir()
-    with only_writer(tmp_path / "out"), started(command, tmp_path) as process:
-        status, err = ended(process)
-    assert (status, len(err.splitlines())) == (2, 1)
-    assert "another process is writing" in err
-    assert [path for path in (tmp_path / "out").rglob("*") if path.is_file()] == []
 
 
 @pytest.mark.parametrize(

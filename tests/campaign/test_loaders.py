@@ -19,27 +19,3 @@ def test_damaged_files_are_refused_in_one_line_or_read(name):
     assert tally.failed == {}, tally.examples
     assert tally.counts["inputs"] == INPUTS
     assert tally.counts.get("refused", 0) + tally.counts.get("accepted", 0) == INPUTS
-
-
-def test_what_goes_wrong_is_noticed(monkeypatch, tmp_path):
-    """A loader that ends its process, one that prints and one that raises something else."""
-
-    def load(path):
-        number = len(list(tmp_path.iterdir()))
-        (tmp_path / str(number)).touch()
-        if number == 2:
-            import os
-
-            os._exit(3)
-        if number == 4:
-            raise ValueError(number)
-
-    loader = LOADERS["task"]
-    monkeypatch.setitem(LOADERS, "task", type(loader)(loader.samples, loader.damage, load))
-    tally = Tally()
-    fuzz("task", 6, 0, tally)
-    assert tally.counts == {"inputs": 6, "accepted": 4}
-    assert sorted(name.partition(" at ")[0] for name in tally.failed) == [
-        "ValueError",
-        "hangs, or ends with status 3",
-    ]

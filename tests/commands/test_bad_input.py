@@ -19,7 +19,10 @@ ARMS = ", ".join(arm_names())
         ("--trials 0", ["trials", "at least 1, got 0"]),
         ("--seed -1", ["seed", "at least 0, got -1"]),
         ("stray", ["stray"]),
+        ("--policy ars-tuned-both-seed0 --arm paper_flange", ["'paper_flange'", "'paper'"]),
+        ("--vec-normalize none", ["--vec-normalize", "models of Stable-Baselines3"]),
         ("--json --markdown", ["exclude each other"]),
+        ("--card made.md", ["a card is of one trained policy on one problem"]),
     ],
 )
 def test_eval_refuses(run, arguments, words):

@@ -11,6 +11,7 @@ from kinarm.evaluation.bounds import bounds_document
 from kinarm.evaluation.evaluation import evaluate
 from kinarm.evaluation.request import EvaluationRequest
 from kinarm.evaluation.selection import select_pairs
+from kinarm.policies import recipe, train_policy
 from kinarm.policies.library import best_policy
 from kinarm.problem import PROBLEMS
 
@@ -32,6 +33,23 @@ def test_a_problem_without_policies_is_told(run):
     answer = run("kinarm-eval", "--problem", "table-paper", "--trials", 1, "--no-oracle")
     assert (answer.status, answer.err) == (0, "")
     assert answer.out.splitlines()[-1] == "no shipped policy was trained for this"
+
+
+def test_replaced_settings_have_a_star_that_names_of_files_lack(run, tmp_path):
+    problem = PROBLEMS["right"].replace(tested_configurations=4)
+    policy = train_policy(recipe("ars", "tuned", problem=problem, iterations=1)).policy
+    policy.save(tmp_path / "ars-tuned-right-seed0.npz")
+    asked = ("--policy", tmp_path, "--trials", 1, "--no-oracle", "--report", tmp_path / "page")
+    answer = run("kinarm-eval", *asked)
+    assert answer.status == 0, answer.err
+    label, star = "ars-tuned*-right-seed0", "* some settings of the recipe are replaced"
+    assert f" {label} " in answer.out
+    assert {star, "training tested steps for contact at 4 configurations"} <= set(
+        answer.out.splitlines()
+    )
+    page = (tmp_path / "page" / "index.html").read_text()
+    assert f"<span>{label}</span>" in page
+    assert star in page
 
 
 def test_policies_need_no_option(evaluated, policy_folder):

@@ -38,27 +38,3 @@ def test_trials_are_solved_once_and_then_looked_up(evaluated, solved, empty_cach
     assert solved == [3]
     assert len(list(empty_cache.iterdir())) == 1
     assert first == second
-
-
-@pytest.mark.parametrize(
-    ("arguments", "words"),
-    [
-        (
-            ["--policy", "lefty.npz", "--policy", "flange.npz", "--matrix"],
-            ["called 'right'", "arm"],
-        ),
-        (["--policy", "flange.npz", "--problem", "right"], ["'paper_flange'", "'paper'"]),
-        (["--policy", "lefty.npz", "--arm", "paper_flange"], ["'paper_flange'", "'paper'"]),
-        (["--policy", "zero", "--task", "left", "--out", "lefty.npz"], ["lefty.npz"]),
-    ],
-)
-def test_what_is_refused_is_refused_before_trials_are_solved(
-    run, policy_folder, solved, empty_cache, arguments, words
-):
-    paths = [policy_folder / word if word.endswith(".npz") else word for word in arguments]
-    answer = run("kinarm-eval", "--trials", 2, *paths)
-    assert (answer.status, answer.out, len(answer.err.splitlines())) == (2, "", 1)
-    for word in words:
-        assert word in answer.err
-    assert solved == []
-    assert not empty_cache.exists()

@@ -1,11 +1,8 @@
 """Command lines on policies that are not kinarm's own."""
 
-import json
 import sys
 
-import numpy as np
 import pytest
-from refusals import check_refused
 
 
 @pytest.fixture
@@ -17,60 +14,12 @@ def here(tmp_path, monkeypatch):
 
 
 @pytest.fixture
-def saved(here):
-    """A model of Stable-Baselines3, with the statistics of its observations beside it."""
-    sb3 = pytest.importorskip("stable_baselines3")
-    from stable_baselines3.common.vec_env import DummyVecEnv, VecNormalize
-
-    from kinarm.envs import ReachEnv
-
-    env = VecNormalize(DummyVecEnv([lambda: ReachEnv("right")]))
-    env.reset()
-    for _ in range(20):
-        env.step(np.ones((1, 5)))
-    sb3.PPO("MlpPolicy", env, seed=1, device="cpu").save(here / "model_20_steps.zip")
-    env.save(here / "model_vecnormalize_20_steps.pkl")
-    return here / "model_20_steps.zip"
-
-
-@pytest.fixture
 def module(here):
     """A module in the current directory."""
     source = "import numpy as np\n\ndef still(seen):\n    return np.zeros((len(seen), 5))\n"
     (here / "still_for_tests.py").write_text(source)
     yield "still_for_tests:still"
     sys.modules.pop("still_for_tests", None)
-
-
-class TestModel:
-    def test_is_evaluated_beside_the_oracle(self, run, saved):
-        arguments = ("--policy", saved, "--problem", "right", "--trials", 5)
-        answer = run("kinarm-eval", *arguments)
-        assert answer.status == 0, answer.err
-        assert "model" in answer.out
-        assert "oracle" in answer.out
-        statistics = saved.with_name("model_vecnormalize_20_steps.pkl")
-        note = f"model_20_steps: observations normalised by {statistics}"
-        assert note in "".join(answer.out.splitlines())
-        rows = json.loads(run("kinarm-eval", *arguments, "--json").out)["results"]
-        assert [(row["policy"], row["trained_on"]) for row in rows] == [
-            ("model_20_steps", "right"),
-            ("oracle", None),
-        ]
-        assert rows[0]["note"] == note
-
-    @pytest.mark.parametrize("command", ["kinarm-eval", "kinarm-replay"])
-    def test_bad_files(self, run, here, command):
-        pytest.importorskip("stable_baselines3")
-        (here / "broken.zip").write_bytes(b"PK")
-        for name, word in (("broken.zip", "not a complete"), ("gone.zip", "No such file")):
-            check_refused(run(command, "--policy", name, "--problem", "right"), name, word)
-
-    @pytest.mark.parametrize("command", ["kinarm-eval", "kinarm-replay"])
-    @pytest.mark.parametrize("policy", ["ars-tuned-both-seed0", "random"])
-    def test_statistics_without_a_model(self, run, here, command, policy):
-        words = (command, "--policy", policy, "--problem", "both", "--vec-normalize", "none")
-        check_refused(run(*words), "--vec-normalize", "models of Stable-Baselines3")
 
 
 class TestModule:

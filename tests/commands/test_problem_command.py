@@ -18,26 +18,6 @@ name = "far"
 lower = [3.0, -0.3, 0.4]
 upper = [3.2, 0.3, 0.6]
 """
-AROUND = """
-[[scene.obstacles]]
-name = "box"
-lower = [-0.3, -0.3, 0.0]
-upper = [0.3, 0.3, 0.6]
-"""
-
-
-def wall(name, lower, upper):
-    return f'[[scene.obstacles]]\nname = "{name}"\nlower = {lower}\nupper = {upper}\n'
-
-
-SHAFT = (
-    wall("front", [0.2, -2.0, 0.0], [2.0, 2.0, 2.0])
-    + wall("back", [-2.0, -2.0, 0.0], [-0.2, 2.0, 2.0])
-    + wall("left", [-0.2, 0.2, 0.0], [0.2, 2.0, 2.0])
-    + wall("right", [-0.2, -2.0, 0.0], [0.2, -0.2, 2.0])
-    + wall("roof", [-0.2, -0.2, 0.47], [0.2, 0.2, 2.0])
-    + '[[scene.goal_regions]]\nname = "right"\nlower = [-0.1, -0.1, 3.0]\nupper = [0.1, 0.1, 3.0]\n'
-)
 
 
 @pytest.fixture
@@ -92,26 +72,11 @@ def test_check_says_what_is_out_of_reach(run, write):
     assert 0.2 < check.out_of_reach.value < 0.8
 
 
-@pytest.mark.parametrize(
-    ("text", "words"),
-    [
-        (AROUND, ["cannot move", "shoulder touches box"]),
-        (SHAFT, ["cannot move: it touches something at all of 2000"]),
-        ("[[scene.obstacles]\n", ["line 1, column 18"]),
-        ('arm = "gone.urdf"', ["gone.urdf", "does not exist"]),
-        ('task = "gone.toml"', ["gone.toml"]),
-        ('[arm]\nsource = "paper"\n[arm.held]\naxis_9 = 1.0', ["'axis_9'", "axis_1"]),
-        (
-            '[[scene.goal_regions]]\nname = "right"\n'
-            "lower = [-0.4, -0.7, 0.1]\nupper = [0.4, -0.6, 0.2]",
-            ["goal region 'right' lies inside obstacle 'right bench'"],
-        ),
-    ],
-)
-def test_refusals(run, write, tmp_path, text, words):
-    path = write(text)
-    check_refused(run("kinarm-problem", "check", path), *words)
-    check_refused(run("kinarm-train", "ars", "--out", "x.npz", "--problem", path), *words)
+def test_a_bad_file_is_refused_by_whatever_reads_it(run, write, tmp_path):
+    path = write("[[scene.obstacles]\n")
+    check_refused(run("kinarm-problem", "check", path), "line 1, column 18")
+    training = run("kinarm-train", "ars", "--out", "x.npz", "--problem", path)
+    check_refused(training, "line 1, column 18")
     assert [file.name for file in tmp_path.iterdir()] == ["mine.toml"]
 
 
@@ -121,6 +86,8 @@ def test_refusals(run, write, tmp_path, text, words):
         (["check", "nothing"], ["'nothing'", "shelf-panda"]),
         (["check", "both", "--picture", "a.jpg"], ["a.jpg", ".png"]),
         (["show", "--tool-frame", "hook"], ["'hook'"]),
+        (["import", "pairs"], ["--arm", "--out"]),
+        (["import", "pairs", "--arm", "paper", "--out", "made"], ["pairs", "no folder"]),
     ],
 )
 def test_bad_usage(run, write, tmp_path, arguments, words):
@@ -178,18 +145,6 @@ class TestImport:
         assert answer.status == 0
         mount = ReachProblem.load("scene1.toml").scene.mount
         assert (mount.position, mount.rpy) == ((1.0, 0.0, 0.5), (0.0, 0.0, 1.5))
-
-    @pytest.mark.parametrize(
-        ("words", "said"),
-        [
-            (["pairs"], ["--arm", "--out"]),
-            (["empty", "--arm", "paper", "--out", "made"], ["empty", "no folder"]),
-            (["pairs", "--arm", "nobody", "--out", "made"], ["'nobody'"]),
-        ],
-    )
-    def test_refusals(self, run, pairs, tmp_path, words, said):
-        check_refused(run("kinarm-problem", "import", *words), *said)
-        assert not list(tmp_path.glob("**/*.toml"))
 
     def test_nothing_is_written_if_one_file_is_bad(self, run, pairs, tmp_path):
         (pairs / "request2.yaml").unlink()

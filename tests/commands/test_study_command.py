@@ -2,15 +2,8 @@
 
 import csv
 import json
-import signal
-import subprocess
-import time
 
-import numpy as np
 import pytest
-from small_studies import contents
-
-from kinarm.evaluation.experiments.study import Study
 
 STUDY = """
 problems = ["right"]
@@ -117,28 +110,3 @@ class TestBadInput:
         answer = run("kinarm-study", *arguments)
         assert answer.status == 2
         assert words in answer.err
-
-
-@pytest.mark.rare
-def test_kills_at_random_moments(command, file, tmp_path):
-    """Whatever is killed, and whenever: the same command ends where one that lived does."""
-    file.write_text(STUDY.replace("seeds = 3", "seeds = 20"))
-    straight = Study(file, tmp_path / "straight").run(jobs=2)
-    rng, kills = np.random.default_rng(0), 0
-    spelled = command("kinarm-study", file, "--out", tmp_path / "it", "--jobs", 2)
-    while kills < 3:
-        process = subprocess.Popen(
-            spelled, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, start_new_session=True
-        )
-        time.sleep(rng.uniform(0.05, 6.0))
-        process.send_signal(signal.SIGKILL)
-        process.wait()
-        kills += 1
-        if len(list((tmp_path / "it").glob("runs/*.npz"))) == len(straight):
-            for path in (tmp_path / "it" / "runs").iterdir():
-                if rng.random() < 0.7:
-                    path.unlink()
-    subprocess.run(spelled, check=True, capture_output=True)
-    assert contents(tmp_path / "it") == contents(tmp_path / "straight")
-    leftover = [*(tmp_path / "it").rglob("*.part"), *(tmp_path / "it").rglob("*.lock")]
-    assert leftover == []

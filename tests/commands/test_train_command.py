@@ -10,6 +10,7 @@ from pathlib import Path
 
 import pytest
 from equal_policies import check_equal
+from refusals import check_refused
 
 from kinarm.policies import Policy, recipe, train_policy
 from kinarm.policies.checkpoint import load_checkpoint, save_checkpoint
@@ -119,16 +120,17 @@ def test_a_recipe_and_a_problem_from_files(run, tmp_path):
     assert made.problem == PROBLEMS["left"].replace(name="near", tolerance=0.1, horizon=9).pinned
 
 
-def test_an_earlier_policy_is_replaced_on_demand_alone(run, tmp_path):
-    out = tmp_path / "p.npz"
-    arguments = ("kinarm-train", "ars", "--iterations", 2, "--out", out)
-    run(*arguments)
-    before = out.read_bytes()
-    answer = run(*arguments, "--seed", 1)
-    assert (answer.status, answer.out, len(answer.err.splitlines())) == (2, "", 1)
-    assert "--overwrite" in answer.err
-    assert out.read_bytes() == before
-    assert run(*arguments, "--seed", 1, "--overwrite").status == 0
+def test_what_is_there_is_replaced_on_demand_alone(run, tmp_path):
+    """A policy, and the checkpoint of a training that goes on."""
+    out, checkpoint = tmp_path / "p.npz", tmp_path / "p.checkpoint.npz"
+    arguments = ("kinarm-train", "ars", "--iterations", 2, "--seed", 1, "--out", out)
+    stop_after(2, recipe("ars", "paper", iterations=4), checkpoint)
+    before = checkpoint.read_bytes()
+    check_refused(run(*arguments), "--resume")
+    checkpoint.rename(out)
+    check_refused(run(*arguments), "--overwrite")
+    assert [(path, path.read_bytes()) for path in tmp_path.iterdir()] == [(out, before)]
+    assert run(*arguments, "--overwrite").status == 0
     assert Policy.load(out).provenance.seed == 1
 
 
@@ -188,14 +190,3 @@ def test_ctrl_c_and_resume_give_the_uninterrupted_policy(run, tmp_path):
     assert run("kinarm-train", "ars", "--out", out, "--resume").status == 0
     assert not checkpoint.exists()
     check_equal(Policy.load(out), train_policy(recipe("ars", "paper", **LONG)).policy)
-
-
-def test_an_unfinished_training_is_not_overwritten(run, tmp_path):
-    checkpoint = tmp_path / "p.checkpoint.npz"
-    stop_after(2, recipe("ars", "paper", iterations=4), checkpoint)
-    before = checkpoint.read_bytes()
-    answer = run("kinarm-train", "ars", "--iterations", 2, "--out", tmp_path / "p.npz")
-    assert (answer.status, answer.out, len(answer.err.splitlines())) == (2, "", 1)
-    assert "--resume" in answer.err
-    assert [path.name for path in tmp_path.iterdir()] == ["p.checkpoint.npz"]
-    assert checkpoint.read_bytes() == before

@@ -1,21 +1,15 @@
 """``kinarm-train --seeds``: several seeds at once, which equal single trainings bit for bit."""
 
-import os
-import signal
-import subprocess
-import time
-from contextlib import suppress
 from pathlib import Path
 
 import pytest
 from equal_policies import check_equal
 
-from kinarm.errors import InvalidInputError
-from kinarm.evaluation.commands.train import seeds_of
+from kinarm.errors import WorkerError
 from kinarm.evaluation.experiments import runs as experiments
+from kinarm.evaluation.experiments.study import Study
 from kinarm.policies import Policy, recipe, train_policy
 
-ROOT = Path(__file__).resolve().parents[2]
 SMALL = ("--directions", 2, "--top-directions", 2)
 NAME = "ars-paper-right-seed{}"
 
@@ -23,24 +17,6 @@ NAME = "ars-paper-right-seed{}"
 def config(seed=0, **changes):
     settings = {"iterations": 9, "directions": 2, "top_directions": 2, **changes}
     return recipe("ars", "paper", problem="right", seed=seed, **settings)
-
-
-@pytest.mark.parametrize(
-    ("text", "seeds"),
-    [
-        ("1", (0,)),
-        ("5", (0, 1, 2, 3, 4)),
-        ("5-7", (5, 6, 7)),
-    ],
-)
-def test_seeds_of_a_text(text, seeds):
-    assert seeds_of(text) == seeds
-
-
-@pytest.mark.parametrize("text", ["0", "", "-3", "7-5", "a", "1.5", "0-1000", "\u0663", "9" * 5000])
-def test_texts_that_are_no_seeds(text):
-    with pytest.raises(InvalidInputError, match=r"^must be a number \(5\) or a rising range"):
-        seeds_of(text)
 
 
 @pytest.mark.parametrize("jobs", [1, 2])
@@ -118,6 +94,9 @@ def test_a_policy_that_was_not_written_is_made_again_and_more_seeds_are_trained(
     ("arguments", "said"),
     [
         (("--seeds", 2, "--seed", 1), "--seed and --seeds exclude each other"),
+        (("--seeds", 0), "must be a number (5) or a rising range"),
+        (("--seeds", "7-5"), "must be a number (5) or a rising range"),
+        (("--seeds", "0-1000"), "must be a number (5) or a rising range"),
         (("--seeds", 2, "--out", "right.npz"), "with --seeds, --out is a folder: --out right"),
     ],
 )
@@ -140,62 +119,15 @@ def test_a_policy_in_the_way(run, tmp_path):
     check_equal(Policy.load(tmp_path / f"{NAME.format(1)}.npz"), train_policy(config(1)).policy)
 
 
-def start(command, folder: Path) -> subprocess.Popen:
-    """Begin a long training of three seeds, two at a time."""
-    arguments = ("ars", "--problem", "right", "--iterations", 300, *SMALL, "--seeds", 3)
-    return subprocess.Popen(
-        command("kinarm-train", *arguments, "--jobs", 2, "--out", folder),
-        cwd=ROOT,
-        env={**os.environ, "COLUMNS": "100"},
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
+def test_lost_workers_are_told(run, tmp_path, monkeypatch):
+    def lose(*_, **__):
+        raise WorkerError("of all things")
+
+    monkeypatch.setattr(Study, "run", lose)
+    answer = run("kinarm-train", "ars", "--seeds", 3, "--out", tmp_path)
+    assert (answer.status, answer.err) == (
+        1,
+        "kinarm-train: workers ended unexpectedly: 0 of 3 seeds are finished; "
+        "the same command goes on\
+",
     )
-
-
-def workers(process: subprocess.Popen) -> list[int]:
-    """Worker processes of a command, of those that it has started."""
-    found = []
-    for listed in Path(f"/proc/{process.pid}/task").glob("*/children"):
-        for number in map(int, listed.read_text().split()):
-            with suppress(OSError):  # it has ended meanwhile
-                line = Path(f"/proc/{number}/cmdline").read_bytes()
-                found += [number] if b"popen_loky" in line else []
-    return found
-
-
-@pytest.mark.slow
-def test_ctrl_c_and_lost_workers_keep_every_seed_and_say_how_to_go_on(command, tmp_path):
-    folder = tmp_path / "right"
-    process = start(command, folder)
-    while not any(folder.glob(".training/*/study.toml")):
-        assert process.poll() is None, process.stderr.read()
-        time.sleep(0.02)
-    process.send_signal(signal.SIGINT)
-    _, errors = process.communicate(timeout=120)
-    assert process.returncode == 130
-    assert "Traceback" not in errors
-    last = errors.splitlines()[-1]
-    assert last.startswith("kinarm-train: interrupted: ")
-    assert last.endswith("the same command goes on")
-
-    process = start(command, folder)
-    while process.poll() is None:
-        for number in workers(process):
-            with suppress(ProcessLookupError):
-                os.kill(number, signal.SIGKILL)
-        time.sleep(0.02)
-    errors = process.communicate()[1]
-    assert process.returncode == 1
-    assert "Traceback" not in errors
-    last = errors.splitlines()[-1]
-    assert last.startswith("kinarm-train: workers ended unexpectedly: ")
-    assert last.endswith("of 3 seeds are finished; the same command goes on")
-
-    process = start(command, folder)
-    _, errors = process.communicate(timeout=300)
-    assert process.returncode == 0, errors
-    for seed in range(3):
-        expected = train_policy(config(seed, iterations=300)).policy
-        check_equal(Policy.load(folder / f"{NAME.format(seed)}.npz"), expected)

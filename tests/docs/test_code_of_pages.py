@@ -27,7 +27,7 @@ EXCEPTIONS = {
     r"kinarm-eval --trials 200( --markdown)?$": "make eval does it",
     r"pip install": "changes the installation",
     r"pip download|tar -x|kinarm-problem import .*ur5": "needs a download; tests/kinarm",
-    r"\. \.venv/bin/activate": "changes the shell; tests/packaging/first_steps.py",
+    r"\. \.venv/bin/activate": "changes the shell; docs/measurements/first_steps.py",
     r"python -m tests\.campaign": "takes hours; tests/campaign runs a share of each",
     r"python -m docs\.measurements": "measures for minutes; tests/docs/test_measurements.py",
     r"python tests/instructions": "records anew; tests/instructions compares",

@@ -71,17 +71,21 @@ def test_protocol_tells_how_it_was_done(document, evaluations):
         assert ReachProblem.from_json(entry["problem"]) == problem.pinned
 
 
-def test_listed_trials_can_be_simulated_again(document, skilled, monkeypatch):
+def test_listed_trials_can_be_simulated_again(evaluations, skilled, monkeypatch):
     """By the reference path, from nothing but the numbers in the document."""
     monkeypatch.setattr("kinarm.reference.SAMPLES", 60)
+    document = made_of(evaluations)
     entry, row = document["protocol"]["problems"]["right"], document["results"][1]
     reference = ReferenceSimulator(Simulator(ReachProblem.from_json(entry["problem"])))
-    for i in range(20):
+    for i in range(25):
         start, goal = np.array(entry["starts"][i]), np.array(entry["goals"][i])
         episode = reference.rollout(skilled, start, goal)
-        assert row["outcomes"]["final_distance"][i] == pytest.approx(episode.distance, abs=1e-9)
-        assert row["outcomes"]["steps"][i] == len(episode.rewards)
-        assert row["outcomes"]["contact"][i] == (episode.contact and list(episode.contact))
+        outcomes = {name: values[i] for name, values in row["outcomes"].items()}
+        assert outcomes["final_distance"] == pytest.approx(episode.distance, abs=1e-9)
+        assert outcomes["steps"] == len(episode.rewards)
+        expected = "success" if episode.success else "collision" if episode.contact else "truncated"
+        assert outcomes["outcome"] == expected
+        assert outcomes["contact"] == (episode.contact and list(episode.contact))
 
 
 def test_table_is_sorted_by_success(document):

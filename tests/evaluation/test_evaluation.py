@@ -1,4 +1,4 @@
-"""Evaluations: their figures against the episodes, and the episodes against the reference path."""
+"""Evaluations: their figures against the episodes."""
 
 import pickle
 from dataclasses import replace
@@ -13,20 +13,6 @@ from kinarm.evaluation.contestants import Contestant
 from kinarm.evaluation.evaluation import evaluate
 from kinarm.evaluation.summary import pool
 from kinarm.policies.oracle import Oracle
-from kinarm.reference import ReferenceSimulator
-
-
-def test_episodes_are_those_of_the_reference(skilled, skilled_evaluation, monkeypatch):
-    monkeypatch.setattr("kinarm.reference.SAMPLES", 60)
-    trials, rollouts = skilled_evaluation.trials, skilled_evaluation.rollouts
-    reference = ReferenceSimulator(trials.simulator)
-    for i in range(25):
-        episode = reference.rollout(skilled, trials.starts[i], trials.goals[i])
-        assert rollouts.distance[i] == pytest.approx(episode.distance, abs=1e-9)
-        assert rollouts.steps[i] == len(episode.rewards)
-        expected = "success" if episode.success else "collision" if episode.contact else "truncated"
-        assert skilled_evaluation.outcomes[i] == expected
-        assert skilled_evaluation.contacts[i] == episode.contact
 
 
 def test_figures_are_those_of_the_episodes(skilled_evaluation):

@@ -35,10 +35,7 @@ def test_a_document_is_read_as_it_was_written(stored, evaluations):
     ("change", "words"),
     [
         (lambda d: d.pop("results"), "missing required field `results`"),
-        (lambda d: d["protocol"]["problems"]["left"]["goals"].append([1]), "length >= 3.*goals"),
         (lambda d: d["protocol"]["problems"]["left"]["goals"][0].__setitem__(0, 10**400), "range"),
-        (lambda d: d["protocol"].update(format_version=3), "Invalid enum value 3.*format_version"),
-        (lambda d: d["results"][0].update(surprise=1), "unknown field `surprise`"),
     ],
 )
 def test_a_damaged_document_is_refused_with_the_place(stored, change, words):

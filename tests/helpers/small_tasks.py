@@ -19,12 +19,3 @@ def kill_own_process_once(folder, number):
         mark.touch()
         os.kill(os.getpid(), signal.SIGKILL)
     return number
-
-
-def seem_to_leak(number):
-    """What a worker does whose memory grows with every task: the pool replaces it."""
-    from joblib.externals.loky import process_executor
-
-    process_executor._MEMORY_LEAK_CHECK_DELAY = 0
-    process_executor._MAX_MEMORY_LEAK_SIZE = -(10**12)
-    return number

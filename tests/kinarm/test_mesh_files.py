@@ -115,15 +115,6 @@ class TestFiles:
         for piece in pieces:  # the mirrored one, too, has its outside out
             assert volume(piece.mesh) == pytest.approx(0.02 * 0.04 * 0.06)
 
-    def test_collada_lies_where_coal_reads_it(self, tmp_path):
-        """Its up axis counts for nothing, there as here; nor do units, there."""
-        path = write_dae(tmp_path / "a.dae")
-        loaded = coal.MeshLoader().load(str(path), np.array([1.0, 2.0, 0.5]))
-        pieces = read_mesh_file(path, (1, 2, 0.5))
-        expected = 0.001 * np.array(loaded.vertices())
-        found = bounds(*(piece.mesh for piece in pieces))
-        np.testing.assert_allclose(found, [expected.min(0), expected.max(0)], atol=1e-6)
-
     def test_stl_without_normals(self, tmp_path):
         path = write_stl(tmp_path / "a.stl", box((30, 20, 10)))
         (piece,) = read_mesh_file(path, (0.001, 0.001, 0.001))

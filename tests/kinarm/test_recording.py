@@ -1,6 +1,5 @@
 """Recordings: they say what the simulator did, and survive a file."""
 
-import json
 from dataclasses import fields, replace
 
 import numpy as np
@@ -117,18 +116,3 @@ def test_they_survive_a_file(recordings, tmp_path):
 def test_nonsense_is_refused(recordings, change, words):
     with pytest.raises(InvalidInputError, match=words):
         replace(recordings[0], **change)
-
-
-def test_missing_entries(recordings, tmp_path):
-    path = tmp_path / "made.npz"
-    recordings[0].save(path)
-    content = dict(np.load(path))
-    header = json.loads(str(content["header"]))
-    del header["recordings"][0]["policy"]
-    np.savez(path, **{**content, "header": np.array(json.dumps(header))})
-    with pytest.raises(RecordingFileError, match="policy"):
-        load_recordings(path)
-    del content["states_0"]
-    np.savez(path, **content)
-    with pytest.raises(RecordingFileError, match="states"):
-        load_recordings(path)

@@ -303,19 +303,12 @@ class TestBadFile:
         make_model("A2C").save(tmp_path / "model.zip")
         return tmp_path / "model.zip"
 
-    def refused(self, path, message):
-        with pytest.raises(PolicyFileError, match=message) as caught:
-            Policy.from_sb3(path, "right")
-        assert "\n" not in str(caught.value)
-        assert path.name in str(caught.value)
-
-    def test_missing(self, tmp_path):
-        self.refused(tmp_path / "gone.zip", "cannot read model .*No such file")
-
-    @pytest.mark.parametrize("content", [b"", b"PK\x03\x04junk"])
-    def test_other_content(self, saved, content):
-        saved.write_bytes(content)
-        self.refused(saved, "is not a complete Stable-Baselines3 model")
+    def test_no_model(self, tmp_path):
+        (tmp_path / "broken.zip").write_bytes(b"PK\x03\x04junk")
+        with pytest.raises(PolicyFileError, match="broken.zip' is not a complete"):
+            Policy.from_sb3(tmp_path / "broken.zip", "right")
+        with pytest.raises(PolicyFileError, match="cannot read model .*gone.zip': No such file"):
+            Policy.from_sb3(tmp_path / "gone.zip", "right")
 
     def test_without_sb3_contrib(self, tmp_path, monkeypatch):
         make_model("TQC").save(tmp_path / "model.zip")

@@ -52,6 +52,14 @@ def test_group_has_the_files_of_all_its_seeds(shipped):
     assert [file.stem for file in files] == ["ars-tuned-right-seed0", "ars-tuned-right-seed10"]
 
 
+def test_a_folder_holds_its_policies_in_the_order_of_their_numbers(tmp_path):
+    with pytest.raises(InvalidInputError, match=r"no policy \(.npz\) in the folder"):
+        policy_files(tmp_path)
+    for name in ("b10", "b9", "b9.checkpoint"):
+        (tmp_path / f"{name}.npz").touch()
+    assert [file.stem for file in policy_files(tmp_path)] == ["b9", "b10"]
+
+
 def test_unknown_name_lists_the_groups(shipped):
     with pytest.raises(UnknownNameError) as caught:
         load_policy("ars-mine")

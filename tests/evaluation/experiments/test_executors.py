@@ -1,23 +1,16 @@
 """Executors: every task once, whatever happens to the workers, on this machine and on clusters."""
 
-import os
-import queue
 from functools import partial
 from importlib.util import find_spec
 from pathlib import Path
 
 import pytest
 import small_tasks
-from small_tasks import (
-    kill_own_process_once,
-    seem_to_leak,
-    square,
-    touch,
-)
+from small_tasks import kill_own_process_once, square, touch
 
 from kinarm.errors import InvalidInputError, WorkerError
 from kinarm.evaluation.commands.study import RunningOptions, StudyRequest
-from kinarm.evaluation.experiments import clusters, executors
+from kinarm.evaluation.experiments import clusters
 from kinarm.evaluation.experiments.clusters import RayExecutor, SlurmExecutor, _do_alike
 from kinarm.evaluation.experiments.executors import Failure, LocalExecutor
 
@@ -103,21 +96,6 @@ def test_a_lost_worker(tmp_path):
     assert sorted(LocalExecutor(2).map(square, range(3))) == [(0, 0), (1, 1), (2, 4)]
 
 
-def test_workers_that_grow_are_replaced_in_silence():
-    """Loky warns of it in a thread of its own, which an error would end, and nothing go on."""
-    done = LocalExecutor(2).map(seem_to_leak, range(8))
-    assert sorted(done) == [(number, number) for number in range(8)]
-
-
-def test_a_worker_ends_when_its_parent_has_ended(monkeypatch):
-    """Linux then gives it another one."""
-    parents, ended = iter([17, 17, 1]), queue.SimpleQueue()
-    monkeypatch.setattr(os, "getppid", lambda: next(parents))
-    monkeypatch.setattr(executors, "WATCHED", 0.0)
-    monkeypatch.setattr(os, "_exit", ended.put)
-    executors._end_with(17)
-    assert ended.get(timeout=30) == 1
-    assert list(parents) == []
 
 
 @needs_ray

@@ -63,15 +63,9 @@ class TestSearch:
     def test_more_go_on(self, searched, tmp_path):
         more = {**SEARCH, "search": {**SEARCH["search"], "count": 8}}
         study = Study(more, tmp_path).run(jobs=2)
+        assert states(study) == ["COMPLETE"] * 8
         assert len(study) == 8
         assert [run.key for run in study.runs[:6]] == [run.key for run in searched.runs]
-
-    def test_what_is_complete_is_not_tried_again(self, searched, tmp_path):
-        best = (tmp_path / "best.toml").read_bytes()
-        (tmp_path / "best.toml").unlink()
-        again = Study(SEARCH, tmp_path).run(jobs=1)
-        assert states(again) == ["COMPLETE"] * 6
-        assert (tmp_path / "best.toml").read_bytes() == best
 
     def test_what_was_under_way_is_tried_again(self, tmp_path):
         study = Study(SEARCH, tmp_path)

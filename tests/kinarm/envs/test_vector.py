@@ -205,12 +205,6 @@ class TestOptions:
         with pytest.raises(InvalidInputError, match=message):
             native("SameStep").reset(options=options)
 
-    def test_the_arm_whose_start_is_in_contact_is_named(self):
-        starts = np.zeros((NUMBER, 6))
-        starts[4] = np.deg2rad([0, 110, -60, 0, 0, 0])
-        with pytest.raises(StartInContactError, match="start 4 is in contact"):
-            native("SameStep").reset(options={"start": starts})
-
     def test_failed_reset_leaves_no_half_begun_episodes(self):
         batch, untouched = native("SameStep"), native("SameStep")
         batch.reset(seed=0)
@@ -223,18 +217,6 @@ class TestOptions:
         except InvalidInputError:
             return  # asking for a new reset is as good as going on
         np.testing.assert_array_equal(observations, untouched.step(actions)[0])
-
-
-@pytest.mark.parametrize(
-    ("settings", "message"),
-    [
-        ({"num_envs": 0}, "num_envs must be a whole number of at least 1"),
-        ({"horizons": 3}, "unexpected keyword argument 'horizons'; available"),
-    ],
-)
-def test_bad_settings_are_refused(settings, message):
-    with pytest.raises(InvalidInputError, match=message):
-        ReachVectorEnv(**settings)
 
 
 @pytest.mark.parametrize("seed", [[1, 2], [], -1, [-1] * NUMBER])

@@ -1,6 +1,6 @@
 """Do what a newcomer does: from a clone to an own policy and its replay, with a log.
 
-``python tests/packaging/first_steps.py data/results/first_steps`` clones what is committed, and
+``python -m docs.measurements.first_steps data/results/first_steps`` clones what is committed, and
 types the commands of the README and then those of the tutorial *First policy*, as they are written,
 in their order. It records what was typed, how long each command took and what it printed, and opens
 the last replay in a browser. Needs the network, Chromium and the extra ``test``. It fails if a
@@ -18,14 +18,9 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import NamedTuple
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
-sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
-sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "docs"))
-
-from browser import open_page
-from helpers.pages import DOCS, ROOT, blocks
-
+from docs.browser import open_page
 from kinarm.evaluation.report.templating import markdown_table
+from tests.helpers.pages import DOCS, ROOT, blocks
 
 ENOUGH = 0.85
 """Success of the newcomer's policy."""
