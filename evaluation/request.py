@@ -24,15 +24,6 @@ Tell = Callable[[str], object]
 """Called with what is being done."""
 
 
-def policy_choices() -> tuple[str, ...]:
-    """Names by which a policy can be chosen."""
-    from kinarm.evaluation.contestants import UNTRAINED
-    from kinarm.policies.library import BEST, group_of, policy_names
-
-    names = policy_names()
-    return (BEST, *dict.fromkeys(map(group_of, names)), *names, *UNTRAINED)
-
-
 @dataclass(frozen=True, kw_only=True)
 class EvaluationRequest(ProblemOptions, TableOptions):
     """Evaluate policies on random reaching trials, beside an oracle.
@@ -98,20 +89,13 @@ class EvaluationRequest(ProblemOptions, TableOptions):
 
     policies: tuple[str, ...] = field(
         default=(),
-        metadata={
-            "flag": "--policy",
-            "bare": True,
-            "metavar": "NAME_OR_FILE",
-            "completes": policy_choices,
-        },
+        metadata={"flag": "--policy", "bare": True, "metavar": "NAME_OR_FILE"},
     )
     problems: tuple[str, ...] = field(
         default=(),
         metadata={"flag": "--problem", "metavar": "NAME_OR_FILE", "names": problem_names},
     )
-    against: str | None = field(
-        default=None, metadata={"metavar": "NAME_OR_FILE", "completes": policy_choices}
-    )
+    against: str | None = field(default=None, metadata={"metavar": "NAME_OR_FILE"})
     trials: int = field(default=200, metadata=TRIALS)
     seed: int = field(default=0, metadata=FROM_ZERO)
     vec_normalize: Path | None = field(default=None, metadata={"metavar": "FILE|none"})

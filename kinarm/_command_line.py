@@ -45,8 +45,8 @@ def add_options(
     dashes, of a positional argument), ``bare`` (values are also taken without
     the option), ``metavar``, ``repeat`` (repetitions of the option give a
     tuple, else its several values), ``nargs`` (how many of these),
-    ``parse`` (makes the value of the text), ``names`` (lists names for help and
-    completion; those given here come first) and ``completes`` (lists them for completion alone).
+    ``parse`` (makes the value of the text), ``names`` (lists names for help;
+    those given here come first).
 
     With ``explicit``, help says every default, and what is false by default has
     ``--no-x``. Fields to ``skip`` get no option.
@@ -95,16 +95,14 @@ def _add_option(
         parser.add_argument(flag, action=action, **options)
         return
     values = _value_options(item, hint, flag)
-    added = [parser.add_argument(flag, **options, **values)]
+    parser.add_argument(flag, **options, **values)
     if item.metadata.get("bare"):
         several = {
             "nargs": "*" if get_origin(hint) is tuple else "?",
             "help": f"The same as {flag}",
         }
         bare = {"default": argparse.SUPPRESS, **values, **several}
-        added.append(parser.add_argument(f"{prefix}{item.name}", **bare))
-    for argument in added:
-        argument.completes = _completes(item, hint, known)  # type: ignore[attr-defined]
+        parser.add_argument(f"{prefix}{item.name}", **bare)
 
 
 def _value_options(item: Field[Any], hint: Any, flag: str) -> dict[str, Any]:
@@ -147,17 +145,6 @@ def _argument_type(make: Callable[[str], Any], hint: Any) -> Callable[[str], Any
         return value
 
     return parsed
-
-
-def _completes(item: Field[Any], hint: Any, known: Sequence[str]) -> Any:
-    """Completion by ``"file"``, ``"folder"`` or a function of names."""
-    if "completes" in item.metadata:
-        return item.metadata["completes"]
-    if known:
-        return lambda: known
-    if item.metadata.get("metavar") in ("DIR", "FOLDER"):
-        return "folder"
-    return "file" if Path in alternatives(hint) or "FILE" in str(item.metadata) else None
 
 
 def option_name(item: Field[Any], prefix: str = "") -> str:

@@ -15,7 +15,6 @@ from kinarm._command_line import option_name
 from kinarm._console import working
 from kinarm._files import check_output
 from kinarm.errors import FROM_ZERO, InvalidInputError
-from kinarm.evaluation.request import policy_choices
 from kinarm.problem_options import ProblemOptions, say_choices
 
 if TYPE_CHECKING:
@@ -103,13 +102,8 @@ class ReplayRequest(ProblemOptions):
         If a number is out of range, or two fields do not go together.
     """
 
-    source: Path | None = field(
-        default=None,
-        metadata={"flag": "source", "metavar": "FILE", "completes": policy_choices},
-    )
-    policy: str | None = field(
-        default=None, metadata={"metavar": "NAME_OR_FILE", "completes": policy_choices}
-    )
+    source: Path | None = field(default=None, metadata={"flag": "source", "metavar": "FILE"})
+    policy: str | None = field(default=None, metadata={"metavar": "NAME_OR_FILE"})
     vec_normalize: Path | None = field(default=None, metadata={"metavar": "FILE|none"})
     wrapper: str | None = field(default=None, metadata={"metavar": "MODULE:FUNCTION"})
     compare: tuple[str, str] | None = field(default=None, metadata={"metavar": ("A", "B")})
@@ -119,10 +113,7 @@ class ReplayRequest(ProblemOptions):
     failures: bool = False
     trials: int | None = None
     seed: int | None = field(default=None, metadata=FROM_ZERO)
-    play: tuple[str, ...] | None = field(
-        default=None,
-        metadata={"metavar": "POLICY", "nargs": "*", "completes": policy_choices},
-    )
+    play: tuple[str, ...] | None = field(default=None, metadata={"metavar": "POLICY", "nargs": "*"})
     allow_other_arm: bool = False
     oracle: bool = True
     out: Path | None = None
