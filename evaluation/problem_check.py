@@ -12,7 +12,7 @@ from kinarm.evaluation.report.templating import template_environment
 from kinarm.evaluation.schemas import Count, Digest, Document, Goal
 from kinarm.evaluation.statistics import Estimate
 from kinarm.evaluation.trials import TrialSet
-from kinarm.policies.mirror import mirror_findings
+from kinarm.policies.mirror import missing_mirror
 from kinarm.policies.oracle import Progress
 from kinarm.world import World
 
@@ -71,9 +71,8 @@ class ProblemCheck(Document, frozen=True, kw_only=True):
     ----------
     problem : dict
         The problem, in the words of problem files.
-    mirror : dict of str
-        What keeps it from being its own mirror image; empty texts if nothing
-        does.
+    mirror : str
+        Why arm and obstacles are not their own mirror image; empty if they are.
     """
 
     problem: dict[str, Any]
@@ -81,7 +80,7 @@ class ProblemCheck(Document, frozen=True, kw_only=True):
     goals: Goals
     starts: Starts
     contact: Contacts
-    mirror: dict[str, str]
+    mirror: str
 
     def __str__(self) -> str:
         content = {name: getattr(self, name) for name in self.__struct_fields__}
@@ -122,7 +121,7 @@ def check_problem(
             touching=[(*pair, share) for pair, share in contact.shares.items()],
             left_out=[(*pair, reason) for pair, reason in world.contact_model.left_out.items()],
         ),
-        mirror=mirror_findings(world),
+        mirror=missing_mirror(world.problem),
     )
 
 
