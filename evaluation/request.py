@@ -52,7 +52,7 @@ class EvaluationRequest(ProblemOptions, TableOptions):
         Seed of the trials.
     vec_normalize : Path
         Statistics of VecNormalize for models of Stable-Baselines3 (runs code),
-        or none; by default those that bear a model's name.
+        or none.
     wrapper : str
         module:function from an environment to a wrapped one, in which policies
         face the trials.

@@ -208,8 +208,7 @@ class Policy:
         vec_normalize : VecNormalize, str or Path, optional
             The statistics that normalise its observations, their file, which
             runs code, or ``"none"``. By default those of the model's
-            environment, and for a file those that bear its name; a model that
-            was trained with others is refused.
+            environment; a file whose model was trained with some is refused.
 
         Raises
         ------

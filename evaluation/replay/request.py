@@ -55,7 +55,7 @@ class ReplayRequest(ProblemOptions):
         (runs its code: only if you trust it), or module:function.
     vec_normalize : Path
         Statistics of VecNormalize for a model of Stable-Baselines3 (runs code),
-        or none; by default those that bear its name.
+        or none.
     wrapper : str
         module:function from an environment to a wrapped one, in which policies
         face the trials.

@@ -29,7 +29,7 @@ def saved(here):
     for _ in range(20):
         env.step(np.ones((1, 5)))
     sb3.PPO("MlpPolicy", env, seed=1, device="cpu").save(here / "model_20_steps.zip")
-    env.save(here / "model_vecnormalize_20_steps.pkl")
+    env.save(here / "statistics.pkl")
     return here / "model_20_steps.zip"
 
 
@@ -44,12 +44,13 @@ def module(here):
 
 class TestModel:
     def test_is_evaluated_beside_the_oracle(self, run, saved):
-        arguments = ("--policy", saved, "--problem", "right", "--trials", 5)
+        statistics = saved.with_name("statistics.pkl")
+        arguments = ("--policy", saved, "--vec-normalize", statistics)
+        arguments += ("--problem", "right", "--trials", 5)
         answer = run("kinarm-eval", *arguments)
         assert answer.status == 0, answer.err
         assert "model" in answer.out
         assert "oracle" in answer.out
-        statistics = saved.with_name("model_vecnormalize_20_steps.pkl")
         note = f"model_20_steps: observations normalised by {statistics}"
         assert note in "".join(answer.out.splitlines())
         rows = json.loads(run("kinarm-eval", *arguments, "--json").out)["results"]
