@@ -1,7 +1,6 @@
 """The parser of command lines: help, one-line errors and version."""
 
 import argparse
-import re
 import textwrap
 from collections.abc import Iterable, Sequence
 from difflib import get_close_matches
@@ -11,9 +10,6 @@ from typing import Any, NoReturn
 
 from kinarm import __version__
 from kinarm.errors import one_line
-
-EXAMPLE = re.compile(r"(?m)^  (\S.*?) {2,}(\S.*)$")
-"""A line of help with an example and its meaning."""
 
 
 class Parser(argparse.ArgumentParser):
@@ -74,11 +70,8 @@ def group_of_options(parser: argparse._ActionsContainer, title: str) -> argparse
     return parser.add_argument_group(title)
 
 
-class HelpFormatter(argparse.HelpFormatter):
-    """Wraps paragraphs, but not blocks with indented lines.
-
-    If an example in a block is too long, their meanings get own lines.
-    """
+class HelpFormatter(argparse.RawDescriptionHelpFormatter):
+    """Its usage shows what is needed alone, and names are not broken at hyphens."""
 
     def _format_usage(
         self,
@@ -96,15 +89,3 @@ class HelpFormatter(argparse.HelpFormatter):
 
     def _split_lines(self, text: str, width: int) -> list[str]:
         return textwrap.wrap(" ".join(text.split()), width, break_on_hyphens=False)
-
-    def _fill_text(self, text: str, width: int, indent: str) -> str:
-        blocks = re.split(r"\n{2,}", text.strip("\n"))
-        return "\n\n".join(textwrap.indent(self._block(each, width), indent) for each in blocks)
-
-    def _block(self, block: str, width: int) -> str:
-        """A paragraph, or lines of which some are indented."""
-        if not re.search(r"(?m)^ ", block):
-            return textwrap.fill(block, width, break_on_hyphens=False)
-        if max(map(len, block.splitlines())) <= width:
-            return block
-        return EXAMPLE.sub(r"  \1\n      \2", block)

@@ -42,7 +42,7 @@ GENERATOR = b'<meta name="generator" content="kinarm">'
 
 @dataclass(frozen=True, kw_only=True)
 class ReplayRequest(ProblemOptions):
-    """Write one HTML file that replays trials offline, or plays policies; or show them live.
+    """Write a page that replays trials offline, or plays policies; or show them live.
 
     Parameters
     ----------
