@@ -6,6 +6,7 @@ import math
 import os
 import re
 import shlex
+import signal
 import sys
 from collections.abc import Callable, Collection, Mapping, Sequence
 from contextlib import suppress
@@ -14,7 +15,7 @@ from pathlib import Path
 from typing import Any, Literal, NoReturn, TypeVar, get_args, get_origin
 
 from kinarm._fields import alternatives, expected, field_types, init_fields, summary_of
-from kinarm._interrupts import EXIT_STATUS, begin, end, was_interrupted
+from kinarm._interrupts import EXIT_STATUS, answer_requests, interrupt, is_interruption
 from kinarm._parser import Parser, group_of_options
 from kinarm.errors import KinarmError, one_line
 
@@ -202,23 +203,23 @@ def run_command(prog: str, command: Callable[[], None]) -> NoReturn:
         if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors="backslashreplace")  # letters that an encoding lacks
     status = 0
-    begin()
+    answer_requests(interrupt)
     try:
         try:
             command()
         except SystemExit as leaving:
             status = leaving.code if isinstance(leaving.code, int) else 0
         sys.stdout.flush()
-        end()
+        answer_requests(signal.SIG_IGN)
     except BaseException as error:
-        end()
+        answer_requests(signal.SIG_IGN)
         status = _status_of(prog, error)
     sys.exit(status)
 
 
 def _status_of(prog: str, error: BaseException) -> int:
     """Report an error in one line; return its status, or raise kinarm's faults."""
-    if was_interrupted(error):
+    if is_interruption(error):
         _discard_output()
         said = str(error) if isinstance(error, KeyboardInterrupt) else ""
         return _report(prog, said or "interrupted", EXIT_STATUS)
