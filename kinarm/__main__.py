@@ -39,7 +39,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
 
 def _explain(typed: Sequence[str]) -> None:
     """Print help or version, or refuse an unknown command."""
-    lines = (f"  {purpose:<42} {PROG}-{name}" for name, (_, purpose) in COMMANDS.items())
+    lines = (f"  {purpose:<44} {PROG}-{name}" for name, (_, purpose) in COMMANDS.items())
     parser = Parser(
         prog=PROG,
         usage=f"{PROG} COMMAND ... [options]",

@@ -93,7 +93,7 @@ def arm_files() -> list[bytes]:
 def recipes() -> list[bytes]:
     """Recipe files."""
     return [
-        b'base = "tuned"\niterations = 20\nstep_size = 0.05\nproblem = "left"\n'
+        b'base = "tuned"\niterations = 20\nstep_size = 0.05\n'
         b"[reward]\nsuccess = 0.5\ncollision = -2.0\n",
         b'noise = 0.1\nsharing = "pair"\nnet_arch = [8, 8]\nnormalize = false\n',
     ]
