@@ -11,7 +11,7 @@ from kinarm.evaluation.outcomes import Pair
 from kinarm.evaluation.report.templating import template_environment
 from kinarm.evaluation.statistics import Estimate
 from kinarm.evaluation.trials import TrialSet
-from kinarm.policies.mirror import mirror_findings
+from kinarm.policies.mirror import missing_mirror
 from kinarm.policies.oracle import Progress
 from kinarm.world import World
 
@@ -36,9 +36,8 @@ class ProblemCheck:
         Random configurations that were tested.
     touching : list
         Pairs of bodies, and at which share of the configurations they touch.
-    mirror : dict of str
-        What keeps it from being its own mirror image; empty texts if nothing
-        does.
+    mirror : str
+        Why arm and obstacles are not their own mirror image; empty if they are.
     """
 
     trials: int
@@ -50,7 +49,7 @@ class ProblemCheck:
     home_contact: Pair | None
     configurations: int
     touching: list[tuple[str, str, float]]
-    mirror: dict[str, str]
+    mirror: str
 
     def __str__(self) -> str:
         template = template_environment().get_template("problem_check.txt")
@@ -90,7 +89,7 @@ def check_problem(
         home_contact=world.contact_model.contact_pair(world.arm.home),
         configurations=len(contact.free),
         touching=[(*pair, share) for pair, share in contact.shares.items()],
-        mirror=mirror_findings(world),
+        mirror=missing_mirror(world.problem),
     )
 
 

@@ -25,15 +25,6 @@ Tell = Callable[[str], object]
 """Called with what is being done."""
 
 
-def policy_choices() -> tuple[str, ...]:
-    """Names by which a policy can be chosen."""
-    from kinarm.evaluation.contestants import UNTRAINED
-    from kinarm.policies.library import BEST, group_of, policy_names
-
-    names = policy_names()
-    return (BEST, *dict.fromkeys(map(group_of, names)), *names, *UNTRAINED)
-
-
 @dataclass(frozen=True, kw_only=True)
 class EvaluationRequest(ProblemOptions, TableOptions):
     """Evaluate policies on random reaching trials, beside an oracle.
@@ -60,7 +51,7 @@ class EvaluationRequest(ProblemOptions, TableOptions):
         Seed of the trials.
     vec_normalize : Path
         Statistics of VecNormalize for models of Stable-Baselines3 (runs code),
-        or none; by default those that bear a model's name.
+        or none.
     wrapper : str
         module:function from an environment to a wrapped one, in which policies
         face the trials.
@@ -96,12 +87,7 @@ class EvaluationRequest(ProblemOptions, TableOptions):
 
     policies: tuple[str, ...] = field(
         default=(),
-        metadata={
-            "flag": "--policy",
-            "bare": True,
-            "metavar": "NAME_OR_FILE",
-            "completes": policy_choices,
-        },
+        metadata={"flag": "--policy", "bare": True, "metavar": "NAME_OR_FILE"},
     )
     problems: tuple[str, ...] = field(
         default=(),

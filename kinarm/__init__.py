@@ -1,11 +1,10 @@
 """kinarm: learn to reach with a simulated six-axis arm, and know how good it is."""
 
-from kinarm import _interrupts as _interrupts  # first: a command answers requests to end from here
-
-# isort: split
 from pathlib import Path
 
 import lazy_loader
+
+from kinarm import _interrupts as _interrupts
 
 __version__ = "1.0.0"
 

@@ -1,13 +1,12 @@
 """``kinarm``, or ``python -m kinarm``, lists commands; ``kinarm eval`` runs one."""
 
 import argparse
-import subprocess
 import sys
 from collections.abc import Sequence
 from importlib import import_module
 
 from kinarm._command_line import run_command
-from kinarm._parser import SHELLS, CommandParser
+from kinarm._parser import Parser
 
 PROG = "kinarm"
 
@@ -39,9 +38,9 @@ def main(arguments: Sequence[str] | None = None) -> None:
 
 
 def _explain(typed: Sequence[str]) -> None:
-    """Print help, version or completion, or refuse an unknown command."""
-    lines = (f"  {purpose:<42} {PROG}-{name}" for name, (_, purpose) in COMMANDS.items())
-    parser = CommandParser(
+    """Print help or version, or refuse an unknown command."""
+    lines = (f"  {purpose:<44} {PROG}-{name}" for name, (_, purpose) in COMMANDS.items())
+    parser = Parser(
         prog=PROG,
         usage=f"{PROG} COMMAND ... [options]",
         description="Learn to reach with a simulated robot arm.\n\nto:\n" + "\n".join(lines),
@@ -50,16 +49,7 @@ def _explain(typed: Sequence[str]) -> None:
     parser.add_argument(
         "command", nargs="?", choices=COMMANDS, metavar="COMMAND", help=argparse.SUPPRESS
     )
-    parser.add_argument(
-        "--print-completion",
-        choices=SHELLS,
-        help="Print the completion script of a shell for all commands and exit",
-    )
-    shell = parser.parse_args(typed).print_completion
-    if shell is not None:
-        for name in COMMANDS:
-            words = [sys.executable, "-m", "kinarm", name, "--print-completion", shell]
-            subprocess.run(words, check=True)
+    parser.parse_args(typed)
 
 
 if __name__ == "__main__":

@@ -6,6 +6,7 @@ import math
 import os
 import re
 import shlex
+import signal
 import sys
 from collections.abc import Callable, Collection, Mapping, Sequence
 from contextlib import suppress
@@ -14,7 +15,7 @@ from pathlib import Path
 from typing import Any, Literal, NoReturn, TypeVar, get_args, get_origin
 
 from kinarm._fields import alternatives, expected, field_types, init_fields, summary_of
-from kinarm._interrupts import EXIT_STATUS, begin, end, was_interrupted
+from kinarm._interrupts import EXIT_STATUS, answer_requests, interrupt, is_interruption
 from kinarm._parser import Parser, group_of_options
 from kinarm.errors import KinarmError, one_line
 
@@ -45,8 +46,8 @@ def add_options(
     dashes, of a positional argument), ``bare`` (values are also taken without
     the option), ``metavar``, ``repeat`` (repetitions of the option give a
     tuple, else its several values), ``nargs`` (how many of these),
-    ``parse`` (makes the value of the text), ``names`` (lists names for help and
-    completion; those given here come first) and ``completes`` (lists them for completion alone).
+    ``parse`` (makes the value of the text), ``names`` (lists names for help;
+    those given here come first).
 
     With ``explicit``, help says every default, and what is false by default has
     ``--no-x``. Fields to ``skip`` get no option.
@@ -95,16 +96,14 @@ def _add_option(
         parser.add_argument(flag, action=action, **options)
         return
     values = _value_options(item, hint, flag)
-    added = [parser.add_argument(flag, **options, **values)]
+    parser.add_argument(flag, **options, **values)
     if item.metadata.get("bare"):
         several = {
             "nargs": "*" if get_origin(hint) is tuple else "?",
             "help": f"The same as {flag}",
         }
         bare = {"default": argparse.SUPPRESS, **values, **several}
-        added.append(parser.add_argument(f"{prefix}{item.name}", **bare))
-    for argument in added:
-        argument.completes = _completes(item, hint, known)  # type: ignore[attr-defined]
+        parser.add_argument(f"{prefix}{item.name}", **bare)
 
 
 def _value_options(item: Field[Any], hint: Any, flag: str) -> dict[str, Any]:
@@ -147,17 +146,6 @@ def _argument_type(make: Callable[[str], Any], hint: Any) -> Callable[[str], Any
         return value
 
     return parsed
-
-
-def _completes(item: Field[Any], hint: Any, known: Sequence[str]) -> Any:
-    """Completion by ``"file"``, ``"folder"`` or a function of names."""
-    if "completes" in item.metadata:
-        return item.metadata["completes"]
-    if known:
-        return lambda: known
-    if item.metadata.get("metavar") in ("DIR", "FOLDER"):
-        return "folder"
-    return "file" if Path in alternatives(hint) or "FILE" in str(item.metadata) else None
 
 
 def option_name(item: Field[Any], prefix: str = "") -> str:
@@ -215,23 +203,23 @@ def run_command(prog: str, command: Callable[[], None]) -> NoReturn:
         if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors="backslashreplace")  # letters that an encoding lacks
     status = 0
-    begin()
+    answer_requests(interrupt)
     try:
         try:
             command()
         except SystemExit as leaving:
             status = leaving.code if isinstance(leaving.code, int) else 0
         sys.stdout.flush()
-        end()
+        answer_requests(signal.SIG_IGN)
     except BaseException as error:
-        end()
+        answer_requests(signal.SIG_IGN)
         status = _status_of(prog, error)
     sys.exit(status)
 
 
 def _status_of(prog: str, error: BaseException) -> int:
     """Report an error in one line; return its status, or raise kinarm's faults."""
-    if was_interrupted(error):
+    if is_interruption(error):
         _discard_output()
         said = str(error) if isinstance(error, KeyboardInterrupt) else ""
         return _report(prog, said or "interrupted", EXIT_STATUS)

@@ -63,8 +63,6 @@ def write_atomically(path: str | Path, write: Callable[[IO[bytes]], object]) -> 
             return
         with _locked(beside, wait=True) as file:
             try:
-                if target.exists():
-                    beside.chmod(target.stat().st_mode)
                 file.truncate()
                 write(file)
                 file.flush()

@@ -1,27 +1,21 @@
 """Requests to end: Ctrl-C and its like end a command in one line and with one status.
 
-A command that starts, with this module, ends at once. While it runs, an `Interruption` is raised,
-which `was_interrupted` recognises even where libraries make another error of it. While it ends,
-requests are ignored. Processes that only import kinarm are left alone.
+While a command runs, a request raises an `Interruption`, unless one is on its way; while it ends,
+requests are ignored. Other processes are left alone.
 """
 
 import os
 import re
 import signal
 import sys
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-
-TYPE_CHECKING = False  # `typing` takes longer to load than all the rest
-if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
+from typing import Any
 
 REQUESTS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 EXIT_STATUS = 130
 
 GOES_ON = "interrupted; what is finished is kept, and the same command goes on"
-
-_phase = "starting"
-_requested = False
 
 
 class Interruption(KeyboardInterrupt):
@@ -41,58 +35,43 @@ def is_command() -> bool:
     return name.partition("-")[0] == "kinarm" and program in sys.orig_argv
 
 
-def _answer(*_: object) -> None:
-    """Answer a request, by the command's phase."""
-    global _requested
-    if _phase == "starting":
-        os._exit(EXIT_STATUS)
-    error = sys.exc_info()[1]
-    while error is not None and not isinstance(error, Interruption):
-        error = error.__context__
-    if _phase == "running" and error is None:  # else one is on its way
-        _requested = True
+def answer_requests(answer: Any) -> None:
+    """Set how a command answers; requests that are ignored from the start stay so."""
+    if is_command():  # pragma: no cover - tests are no command; test_interrupts starts some
+        for request in REQUESTS:
+            if signal.getsignal(request) is not signal.SIG_IGN:
+                signal.signal(request, answer)
+
+
+def interrupt(*_: object) -> None:
+    """Raise an `Interruption`, unless one is on its way."""
+    if not is_interruption(sys.exc_info()[1]):
         raise Interruption
 
 
-def begin() -> None:
-    """From now on requests are raised."""
-    global _phase
-    _phase = "running"
-
-
-def end() -> None:
-    """From now on requests are ignored."""
-    global _phase
-    _phase = "ending"
-
-
-def was_interrupted(error: BaseException) -> bool:
-    """Whether a request to end caused an error."""
-    return _requested or isinstance(error, KeyboardInterrupt)
+def is_interruption(error: BaseException | None) -> bool:
+    """Whether an error is an interruption, or came up while one was on its way."""
+    while error is not None and not isinstance(error, KeyboardInterrupt):
+        error = error.__context__
+    return error is not None
 
 
 @contextmanager
-def telling(what_is_left: "Callable[[], str]") -> "Iterator[None]":
+def telling(what_is_left: Callable[[], str]) -> Iterator[None]:
     """Do what can be interrupted; ``what_is_left`` then gives a line."""
     try:
         yield
     except BaseException as error:
-        if not was_interrupted(error):
+        if not is_interruption(error):
             raise
         raise KeyboardInterrupt(what_is_left()) from None
 
 
 @contextmanager
-def kept_from_children() -> "Iterator[None]":
+def kept_from_children() -> Iterator[None]:
     """Keep what a terminal sends from processes that start here."""
     before = signal.pthread_sigmask(signal.SIG_BLOCK, (signal.SIGINT, signal.SIGHUP))
     try:
         yield
     finally:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
-
-
-if is_command():  # pragma: no cover - tests are no command; test_interrupts starts some
-    for _request in REQUESTS:
-        if signal.getsignal(_request) is not signal.SIG_IGN:
-            signal.signal(_request, _answer)

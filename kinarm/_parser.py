@@ -1,36 +1,15 @@
-"""The parser of command lines: help, one-line errors, version and completion."""
+"""The parser of command lines: help, one-line errors and version."""
 
 import argparse
-import re
-import shlex
-import sys
 import textwrap
-import zlib
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Iterable, Sequence
 from difflib import get_close_matches
 from importlib import import_module
 from pathlib import Path
-from typing import Any, ClassVar, NoReturn
+from typing import Any, NoReturn
 
 from kinarm import __version__
 from kinarm.errors import one_line
-
-EXAMPLE = re.compile(r"(?m)^  (\S.*?) {2,}(\S.*)$")
-"""A line of help with an example and its meaning."""
-
-SHELLS = ("bash", "zsh", "fish")
-
-FUNCTIONS: dict[str, Callable[[Iterable[str], str], str]] = {
-    "bash": lambda names, call: (
-        f"{call}() {{ compgen -W {shlex.quote(' '.join(names))} -- $1; _shtab_compgen_files $1; }}"
-    ),
-    "zsh": lambda names, call: f"{call}() {{ compadd -- {shlex.join(names)}; _files }}",
-    "fish": lambda names, call: (
-        f"function {call}; printf '%s\\n' {shlex.join(names)}; "
-        "__fish_complete_path (commandline -ct); end"
-    ),
-}
-"""Shell functions that list names and files."""
 
 
 class Parser(argparse.ArgumentParser):
@@ -38,8 +17,6 @@ class Parser(argparse.ArgumentParser):
 
     Its help ends with the text of ``data/help`` with its name, if any.
     """
-
-    completable: ClassVar[bool] = True
 
     def __init__(self, **options: Any) -> None:
         super().__init__(formatter_class=HelpFormatter, add_help=False, **options)
@@ -51,14 +28,6 @@ class Parser(argparse.ArgumentParser):
             version=f"kinarm {__version__}",
             help="Show the version of kinarm and exit",
         )
-        if self.completable:
-            self.add_argument(
-                "--print-completion",
-                action=_PrintCompletion,
-                default=argparse.SUPPRESS,
-                choices=SHELLS,
-                help="Print the completion script of a shell and exit",
-            )
 
     def parse_known_args(  # type: ignore[override]
         self, args: Sequence[str] | None = None, namespace: argparse.Namespace | None = None
@@ -73,11 +42,11 @@ class Parser(argparse.ArgumentParser):
             self.error(f"unrecognized arguments: {' '.join(unknown)}{hint}")
         return parsed, unknown
 
-    def add_commands(self, what: str) -> "argparse._SubParsersAction[CommandParser]":
+    def add_commands(self, what: str) -> "argparse._SubParsersAction[Parser]":
         """Let the first word be a command, called ``what``, with options."""
         title, metavar = f"{what}s", what.upper()
         return self.add_subparsers(
-            title=title, dest=what, required=True, metavar=metavar, parser_class=CommandParser
+            title=title, dest=what, required=True, metavar=metavar, parser_class=Parser
         )
 
     def error(self, message: str) -> NoReturn:
@@ -93,12 +62,6 @@ class Parser(argparse.ArgumentParser):
         return super().format_help()
 
 
-class CommandParser(Parser):
-    """The parser of a program's command, without completion."""
-
-    completable = False
-
-
 def group_of_options(parser: argparse._ActionsContainer, title: str) -> argparse._ActionsContainer:
     """Group of a parser with a title, made if missing."""
     for group in parser._action_groups:
@@ -107,11 +70,8 @@ def group_of_options(parser: argparse._ActionsContainer, title: str) -> argparse
     return parser.add_argument_group(title)
 
 
-class HelpFormatter(argparse.HelpFormatter):
-    """Wraps paragraphs, but not blocks with indented lines.
-
-    If an example in a block is too long, their meanings get own lines.
-    """
+class HelpFormatter(argparse.RawDescriptionHelpFormatter):
+    """Its usage shows what is needed alone, and names are not broken at hyphens."""
 
     def _format_usage(
         self,
@@ -129,58 +89,3 @@ class HelpFormatter(argparse.HelpFormatter):
 
     def _split_lines(self, text: str, width: int) -> list[str]:
         return textwrap.wrap(" ".join(text.split()), width, break_on_hyphens=False)
-
-    def _fill_text(self, text: str, width: int, indent: str) -> str:
-        blocks = re.split(r"\n{2,}", text.strip("\n"))
-        return "\n\n".join(textwrap.indent(self._block(each, width), indent) for each in blocks)
-
-    def _block(self, block: str, width: int) -> str:
-        """A paragraph, or lines of which some are indented."""
-        if not re.search(r"(?m)^ ", block):
-            return textwrap.fill(block, width, break_on_hyphens=False)
-        if max(map(len, block.splitlines())) <= width:
-            return block
-        return EXAMPLE.sub(r"  \1\n      \2", block)
-
-
-class _PrintCompletion(argparse.Action):
-    def __call__(self, parser: argparse.ArgumentParser, *given: Any) -> None:
-        _, shell, *_ = given
-        sys.stdout.write(completion_script(parser, shell))
-        parser.exit()
-
-
-def completion_script(parser: argparse.ArgumentParser, shell: str) -> str:
-    """Script of a shell for options that `add_options` added."""
-    import shtab
-
-    for action in _actions(parser):
-        if action.help:
-            action.help = action.help.partition(" (default: ")[0]
-        completes = getattr(action, "completes", None)
-        if completes in ("file", "folder"):
-            action.complete = shtab.FILE if completes == "file" else shtab.DIRECTORY  # type: ignore[attr-defined]
-        elif completes is not None:
-            action.complete = _names_or_files(shell, tuple(completes()))  # type: ignore[attr-defined]
-    script: str = shtab.complete(parser, shell=shell)
-    return script + "\n"
-
-
-def _actions(parser: argparse.ArgumentParser) -> Iterator[argparse.Action]:
-    """All options of a parser and its commands."""
-    for action in parser._actions:
-        yield action
-        if isinstance(action, argparse._SubParsersAction):
-            for inner in action.choices.values():
-                yield from _actions(inner)
-
-
-def _names_or_files(shell: str, names: tuple[str, ...]) -> dict[str, Any]:
-    """How a shell completes one of some names or a file."""
-    call = f"_kinarm_files_or_names_{zlib.crc32(' '.join(names).encode()):08x}"
-    return {
-        "bash": call,
-        "zsh": f"{{{call}}}",
-        "fish": f"({call})",
-        "preamble": {shell: FUNCTIONS[shell](names, call)},
-    }

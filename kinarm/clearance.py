@@ -1,11 +1,8 @@
-"""Distances from contact, frequencies of contact at random, goals in reach, and warnings.
-
-That no configuration is found for a goal proves nothing; the oracle does.
-"""
+"""Distances from contact, frequencies of contact at random, and warnings."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import pinocchio as pin
@@ -18,9 +15,6 @@ from kinarm.contact_pairs import TOUCH_AT_HOME, make_verdicts_reliable
 from kinarm.errors import ProblemError
 from kinarm.kernels.compiling import Array
 from kinarm.scene import Scene
-
-if TYPE_CHECKING:
-    from kinarm.world import World
 
 
 class Clearance(NamedTuple):
@@ -134,28 +128,6 @@ def random_configurations(model: ContactModel, count: int, seed: int = 0) -> Arr
     uniforms = np.random.default_rng(seed).random((count, arm.n_actuated))
     q[:, moved] = arm.lower[moved] + uniforms * (arm.upper - arm.lower)[moved]
     return q
-
-
-MANY = 0.1
-"""Share of goals that may be missed without a warning."""
-
-
-def reach_warning(world: "World") -> str | None:
-    """Say in a line if many of a problem's goals seem out of reach.
-
-    Raises ProblemError if the arm always touches something.
-    """
-    from kinarm.goal_kinematics import SAMPLE  # which much else does without
-
-    missed = SAMPLE - world.reachable_of_sample
-    if missed <= MANY * SAMPLE:
-        return None
-    if missed == SAMPLE:
-        ContactStatistics.sample(world.contact_model).check_movable(world.arm.name)
-    return (
-        f"problem {world.problem.name}: no contact-free configuration was found for {missed} of "
-        f"{SAMPLE} goals; see kinarm-problem check"
-    )
 
 
 FASTEST = 30.0

@@ -10,21 +10,16 @@ from functools import lru_cache
 from typing import Any
 
 import numpy as np
-import pinocchio as pin
-from numpy.typing import NDArray
 
 from kinarm.bodies import Body, Point
-from kinarm.clearance import random_configurations
 from kinarm.contact_shapes import CUBE
 from kinarm.errors import InvalidInputError
-from kinarm.goals import GoalSpecification
-from kinarm.kernels.compiling import Array
 from kinarm.networks import Mirror
 from kinarm.problem import ReachProblem
 from kinarm.world import World
 
-TESTED_CONFIGURATIONS, MIRRORED_CONFIGURATIONS = 16, 2000
-"""Where observations are compared, and contact."""
+TESTED_CONFIGURATIONS = 16
+"""Where observations are compared."""
 
 ACCURACY = 1e-9
 
@@ -47,53 +42,11 @@ def find_mirror(world: World) -> Mirror:
     goals = rng.normal(size=(TESTED_CONFIGURATIONS, world.goal_width))
     reflected = world.observe(axes * q, goals * of_goal)
     apart = np.abs(reflected - world.observe(q, goals) * mirror.observations).max()
-    if _beyond_limits(axes, arm.lower, arm.upper).any() or apart > ACCURACY:
+    limits = np.sort([axes * arm.lower, axes * arm.upper], axis=0)
+    uneven = np.abs(limits - [arm.lower, arm.upper]).max()
+    if uneven > ACCURACY or apart > ACCURACY:
         raise InvalidInputError(f"arm {arm.name!r} is not its own mirror image")
     return mirror
-
-
-def _beyond_limits(axes: Array, lower: Array, upper: Array) -> NDArray[np.bool_]:
-    """Joints whose limits are not their own mirror image."""
-    apart = np.abs(np.sort([axes * lower, axes * upper], axis=0) - [lower, upper])
-    uneven: NDArray[np.bool_] = apart.max(axis=0) > ACCURACY
-    return uneven
-
-
-def mirror_findings(world: World) -> dict[str, str]:
-    """Reasons against reflecting arm, scene and task.
-
-    Joints that turn about y, or slide across it, keep their sign, judged with all joints at zero.
-    Joints that are not actuated stay at home. For ``kinematics``, ``limits``, ``contact``,
-    ``scene`` and ``observations`` (whether their mirror images differ by signs alone), there is a
-    reason, or an empty text.
-    """
-    arm = world.arm
-    data, moved = arm.model.createData(), slice(arm.n_actuated)
-    pin.forwardKinematics(arm.model, data, np.zeros(arm.n_joints))
-    turned = zip(list(data.oMi)[1:], arm.chain.axis, strict=True)
-    across = np.array([abs((pose.rotation @ axis)[1]) > 0.5 for pose, axis in turned])
-    axes = np.where(across ^ arm.chain.prismatic, 1.0, -1.0)[moved]
-    q = random_configurations(world.contact_model, MIRRORED_CONFIGURATIONS)
-    beyond = _beyond_limits(axes, arm.lower[moved], arm.upper[moved])
-    uneven = [arm.joint_names[joint] for joint in np.flatnonzero(beyond)]
-    mirrored = q.copy()
-    mirrored[:, moved] *= axes
-    tools, touching = world.screen(q)
-    reflected, touching_there = world.screen(mirrored)
-    apart = np.abs(reflected - tools * REFLECTION).max()
-    differing = (touching != touching_there).mean()
-    found = {
-        "kinematics": f"tool points differ by up to {apart:.3g} m" if apart > ACCURACY else "",
-        "limits": f"those of {', '.join(uneven)} are uneven" if uneven else "",
-        "contact": f"differs at {differing:.1%} of {len(q)} configurations" if differing else "",
-        "scene": "" if is_symmetric(world.problem) else "obstacles or goals are not their image",
-        "observations": "",
-    }
-    try:
-        find_mirror(world)
-    except InvalidInputError:
-        found["observations"] = "joint frames are not their image"
-    return found
 
 
 @lru_cache(maxsize=8)
@@ -138,24 +91,6 @@ def obstacles_are_symmetric(problem: ReachProblem) -> bool:
         return False
     bodies = problem.scene.bodies
     return {_outline(each, REFLECTION) for each in bodies} == {_outline(each) for each in bodies}
-
-
-def is_symmetric(problem: ReachProblem) -> bool:
-    """Whether the reflection maps obstacles, goals and weights to themselves."""
-    task, scene = problem.task, problem.scene
-    weights = task.goal_weights or (1.0,) * len(task.goal_regions)
-    regions = [scene.goal_region(name) for name in task.goal_regions]
-    goals = {(region.lower, region.upper, w) for region, w in zip(regions, weights, strict=True)}
-    reflected = {(*_reflected(lower, upper), w) for lower, upper, w in goals}
-    rests = _rests_are_symmetric(task.goal)
-    return goals == reflected and rests and obstacles_are_symmetric(problem)
-
-
-def _rests_are_symmetric(goal: GoalSpecification) -> bool:
-    """Whether the reflection surely maps what goals have beside a position to itself."""
-    turned = {(-roll, pitch, -yaw) for roll, pitch, yaw in goal.rotations}
-    level = goal.axis is None or goal.axis[1] == 0
-    return level and turned == set(goal.rotations) and not goal.configurations
 
 
 def _outline(body: Body, signs: Point = (1.0, 1.0, 1.0)) -> tuple[Any, ...]:

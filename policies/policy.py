@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from kinarm._fields import from_plain, to_plain
 from kinarm._files import Archive, load_archive, reading, save_archive, write_atomically
 from kinarm.arm import Arm
 from kinarm.errors import InvalidInputError, PolicyFileError, finite_array
@@ -207,8 +208,7 @@ class Policy:
         vec_normalize : VecNormalize, str or Path, optional
             The statistics that normalise its observations, their file, which
             runs code, or ``"none"``. By default those of the model's
-            environment, and for a file those that bear its name; a model that
-            was trained with others is refused.
+            environment; a file whose model was trained with some is refused.
 
         Raises
         ------
@@ -312,7 +312,7 @@ class Policy:
 def policy_content(policy: Policy) -> Archive:
     """A policy as files hold it, for `policy_of_content`."""
     header = {
-        "provenance": policy.provenance.to_json(),
+        "provenance": to_plain(policy.provenance),
         "observation": observation_layout(policy.problem),
         "activations": list(policy.activations),
         **({"shield": True} if policy.shield else {}),
@@ -326,7 +326,7 @@ def policy_of_content(content: Archive, where: str) -> Policy:
     Call it within `kinarm._files.reading`, which turns errors into messages.
     """
     header, arrays = content
-    provenance = Provenance.from_json(header["provenance"])
+    provenance = from_plain(Provenance, header["provenance"], "provenance")
     layout = observation_layout(provenance.problem)
     if header["observation"] != layout:
         raise PolicyFileError(

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from kinarm import SEMANTICS
-from kinarm._fields import from_plain, to_plain
+from kinarm._fields import to_plain
 from kinarm.policies.config import TrainingConfig
 from kinarm.problem import ReachProblem
 
@@ -76,15 +76,6 @@ class Provenance:
             commit=source_commit(),
             semantics=SEMANTICS,
         )
-
-    def to_json(self) -> dict[str, Any]:
-        """As a dictionary that JSON can hold."""
-        return dict(to_plain(self))
-
-    @classmethod
-    def from_json(cls, entries: Mapping[str, Any]) -> "Provenance":
-        """Rebuild what `to_json` returned; missing or unknown entries are refused."""
-        return from_plain(cls, entries, "provenance")
 
 
 def plain_settings(config: TrainingConfig) -> dict[str, Any]:

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from kinarm._fields import from_plain, init_fields, read_toml, take_base, to_plain
-from kinarm._files import is_file, shipped_files
+from kinarm._files import shipped_files
 from kinarm.errors import InvalidInputError, UnknownNameError
 from kinarm.policies.config import ConfigT
 from kinarm.policies.learners import Learner, find_learner
@@ -73,20 +73,14 @@ def _named_recipe(learner: Learner[Any, Any], name: str, circumstances: Mapping[
 
 
 def _read_recipe(learner: Learner[Any, Any], path: Path, circumstances: Mapping[str, Any]) -> Any:
-    """Settings of a file for a problem and a seed, which may be in the file."""
+    """Settings of a file for a problem and a seed."""
     entries = read_toml(path, "recipe")
+    for key in PER_TRAINING:
+        if key in entries:
+            raise InvalidInputError(f"{path}: a recipe has no {key}; give it as --{key}")
     base = take_base(entries, str(path), learner.recipes, learner.first_recipe)
-    known, problem = {**circumstances}, entries.pop("problem", None)
-    if problem is not None and "problem" not in known:
-        if not isinstance(problem, str):
-            raise InvalidInputError(
-                f"{path}: problem must be the name or file of a problem, got {problem!r}"
-            )
-        beside = path.parent / problem
-        known["problem"] = ReachProblem.load(beside if is_file(beside) else problem)
-    standard = _named_recipe(learner, base, known)
-    given = {"recipe": path.stem, **{key: v for key, v in entries.items() if key not in known}}
-    plain = to_plain(standard)
+    standard = _named_recipe(learner, base, circumstances)
+    given, plain = {"recipe": path.stem, **entries}, to_plain(standard)
     if "reward" in given:
         plain["reward"] = to_plain(standard.training_problem.task.reward)
     for name, entry in given.items():

@@ -188,19 +188,9 @@ class TrainRequest(ProblemOptions):
 
 
 def say_findings(config: TrainingConfig) -> None:
-    """Say on standard error what was chosen, and what hinders the training.
-
-    The latter is many goals out of reach, but in the paper's problems, or a ``symmetric`` without
-    effect.
-    """
-    from kinarm.clearance import reach_warning
+    """Say on standard error what was chosen, and of a ``symmetric`` without effect."""
     from kinarm.policies.mirror import missing_mirror
-    from kinarm.problem import PROBLEMS
-    from kinarm.world import World
 
     say_choices([config.problem])
-    known = config.problem.digest in [each.digest for each in PROBLEMS.values()]
-    if not known and (line := reach_warning(World(config.problem))):
-        sys.stderr.write(f"{line}\n")
     if getattr(config, "symmetric", False) and (reason := missing_mirror(config.problem)):
         sys.stderr.write(f"symmetric has no effect: {reason}\n")

@@ -17,7 +17,7 @@ SUFFIXES = (".csv", ".json", ".html")
 
 @dataclass(frozen=True, kw_only=True)
 class PlanRequest(PlanSettings, ProblemOptions):
-    """Plan a motion of all joints, from rest to rest, that touches nothing at any time.
+    """Plan a motion from rest to rest that touches nothing at any time.
 
     Parameters
     ----------

@@ -52,7 +52,7 @@ class ShowRequest(ProblemOptions):
 
 @dataclass(frozen=True, kw_only=True)
 class CheckRequest(ShowRequest):
-    """Check which goals can be reached, how many starts are free, what touches, and the symmetry.
+    """Check goals in reach, free starts, contact, and symmetry.
 
     Parameters
     ----------

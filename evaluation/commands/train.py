@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 from kinarm._command_line import add_options, given_options, run_command
 from kinarm._fields import Checked
 from kinarm._files import shipped_files
-from kinarm._parser import CommandParser, Parser
+from kinarm._parser import Parser
 from kinarm.errors import FROM_ZERO, InvalidInputError
 from kinarm.policies.learners import Learner, find_learner, learner_names
 from kinarm.policies.training import TrainRequest, curve_path
@@ -109,7 +109,7 @@ def build_parser(named: str | None = None) -> Parser:
 
 
 def _add_learner(
-    parsers: "argparse._SubParsersAction[CommandParser]", name: str, learner: Learner[Any, Any]
+    parsers: "argparse._SubParsersAction[Parser]", name: str, learner: Learner[Any, Any]
 ) -> None:
     """Add the options of every training, and those of a learner's settings."""
     needs = f"\nneeds the extra {learner.extra}: pip install 'kinarm[{learner.extra}]'\n"

@@ -13,7 +13,6 @@ from kinarm._command_line import option_name
 from kinarm._console import working
 from kinarm._files import check_output
 from kinarm.errors import FROM_ZERO, InvalidInputError
-from kinarm.evaluation.request import policy_choices
 from kinarm.problem_options import ProblemOptions, say_choices
 
 if TYPE_CHECKING:
@@ -38,7 +37,7 @@ GENERATOR = b'<meta name="generator" content="kinarm">'
 
 @dataclass(frozen=True, kw_only=True)
 class ReplayRequest(ProblemOptions):
-    """Write one HTML file that replays trials offline, or plays policies.
+    """Write a page that replays trials offline, or plays policies.
 
     Parameters
     ----------
@@ -50,7 +49,7 @@ class ReplayRequest(ProblemOptions):
         (runs its code: only if you trust it), or module:function.
     vec_normalize : Path
         Statistics of VecNormalize for a model of Stable-Baselines3 (runs code),
-        or none; by default those that bear its name.
+        or none.
     wrapper : str
         module:function from an environment to a wrapped one, in which policies
         face the trials.
@@ -88,13 +87,8 @@ class ReplayRequest(ProblemOptions):
         If a number is out of range, or two fields do not go together.
     """
 
-    source: Path | None = field(
-        default=None,
-        metadata={"flag": "source", "metavar": "FILE", "completes": policy_choices},
-    )
-    policy: str | None = field(
-        default=None, metadata={"metavar": "NAME_OR_FILE", "completes": policy_choices}
-    )
+    source: Path | None = field(default=None, metadata={"flag": "source", "metavar": "FILE"})
+    policy: str | None = field(default=None, metadata={"metavar": "NAME_OR_FILE"})
     vec_normalize: Path | None = field(default=None, metadata={"metavar": "FILE|none"})
     wrapper: str | None = field(default=None, metadata={"metavar": "MODULE:FUNCTION"})
     compare: tuple[str, str] | None = field(default=None, metadata={"metavar": ("A", "B")})
@@ -103,10 +97,7 @@ class ReplayRequest(ProblemOptions):
     failures: bool = False
     trials: int | None = None
     seed: int | None = field(default=None, metadata=FROM_ZERO)
-    play: tuple[str, ...] | None = field(
-        default=None,
-        metadata={"metavar": "POLICY", "nargs": "*", "completes": policy_choices},
-    )
+    play: tuple[str, ...] | None = field(default=None, metadata={"metavar": "POLICY", "nargs": "*"})
     allow_other_arm: bool = False
     oracle: bool = True
     out: Path | None = None

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 
+from kinarm._fields import to_plain
 from kinarm.evaluation.contestants import Contestant
 from kinarm.evaluation.trials import TrialSet
 from kinarm.policies.oracle.solutions import OracleSolutions
@@ -42,7 +43,7 @@ def record(
     simulator = trials.simulator
     contestant.check(simulator.problem, simulator.arm, allow_other_arm=allow_other_arm)
     rollouts = contestant.run(trials, record=True)
-    made = contestant.policy.provenance.to_json() if contestant.policy else None
+    made = to_plain(contestant.policy.provenance) if contestant.policy else None
     known = [] if bounds is None else bounds.steps_lower_bound.tolist()
     return record_rollouts(
         trials.simulator,

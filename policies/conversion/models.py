@@ -110,24 +110,8 @@ def _algorithm_of(family: str, data: Mapping[str, Any]) -> str:
 NONE = "none"
 """Stands for a model without statistics."""
 
-LYING_BESIDE = ("vecnormalize.pkl", "vec_normalize.pkl")
-"""Usual names of statistics that do not say which model they are of."""
-
 ROUNDING = 1e-3
 """How far the norm of a quaternion that nobody changed is from 1, at most."""
-
-
-def find_vec_normalize(model: Path) -> Path | None:
-    """Find the statistics that bear a model's name.
-
-    ``prefix_vecnormalize_1000_steps.pkl`` is of the checkpoint ``prefix_1000_steps.zip`` beside it,
-    ``id_1/id/vecnormalize.pkl`` of rl-zoo3's models in ``id_1``. Returns None if there are none.
-    """
-    folder, (prefix, _, number) = model.resolve().parent, model.stem[:-6].rpartition("_")
-    places = [folder / folder.name.rpartition("_")[0] / LYING_BESIDE[0]]
-    if model.stem.endswith("_steps"):
-        places.insert(0, folder / f"{prefix}_vecnormalize_{number}_steps.pkl")
-    return next((place for place in places if place.is_file()), None)
 
 
 def load_vec_normalize(given: Any) -> Any:
@@ -172,9 +156,9 @@ def check_not_normalized(last: Any, layout: ObservationLayout, model: Path) -> N
     changed = np.abs(np.linalg.norm(quaternions, axis=1) - 1) > ROUNDING
     if changed.mean() < 0.5:
         return
-    beside = (model.parent / name for name in LYING_BESIDE)
-    file = next((str(path) for path in beside if path.is_file()), "FILE")
+    near = [*model.parent.glob("*vec*normalize*.pkl"), *model.parent.glob("*/vecnormalize.pkl")]
+    file = near[0] if len(near) == 1 else "FILE"
     raise InvalidInputError(
-        "the observations of its training were normalised, and no statistics bear its name: give "
-        f"them (--vec-normalize {file}), or use none (--vec-normalize {NONE})"
+        "the observations of its training were normalised: give their statistics "
+        f"(--vec-normalize {file}), or use none (--vec-normalize {NONE})"
     )

@@ -27,7 +27,6 @@ from kinarm.policies.conversion.models import (
     NONE,
     SB3Model,
     check_not_normalized,
-    find_vec_normalize,
     load_vec_normalize,
     sb3_model,
 )
@@ -114,8 +113,6 @@ def _statistics_of(
 
     if str(asked) == NONE:
         return None, NONE
-    if asked is None and model.file is not None:
-        asked = find_vec_normalize(model.file)
     if asked is not None:
         is_file = isinstance(asked, str | Path)
         return load_vec_normalize(asked), str(asked) if is_file else "VecNormalize"

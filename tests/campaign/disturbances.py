@@ -184,7 +184,7 @@ def interrupt(command: str, count: int, seed: int, tally: Tally) -> None:
                     (os.killpg if rng.integers(2) else os.kill)(process.pid, request)
                 time.sleep(rng.choice([0.0, 0.01, 0.5]))
             status, err = ended(process)
-            early = status == -request and not err  # Python itself was still starting
+            early = status == -request and "run_command" not in err  # the command had not begun
             tally.count({0: "finished", 130: "interrupted"}.get(status or 0, "early"))
             if found := "" if early else unfit(command, status, err, (0, 130)):
                 tally.find(found, number=number, request=request.name, err=err[-2000:])

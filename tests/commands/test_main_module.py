@@ -65,14 +65,3 @@ def test_every_command_tells_the_version(run, program):
     answer = run(program, "--version")
     assert (answer.status, answer.err) == (0, "")
     assert answer.out == f"kinarm {metadata.version('kinarm')}\n"
-
-
-def test_it_prints_the_completion_of_its_commands(capfd, monkeypatch):
-    """Each in a process of its own, whose output this one does not see."""
-    few = {name: COMMANDS[name] for name in ("arms", "eval")}
-    monkeypatch.setattr("kinarm.__main__.COMMANDS", few)
-    with pytest.raises(SystemExit):
-        main(("--print-completion", "bash"))
-    lines = capfd.readouterr().out.splitlines()
-    ends = [line.split()[-1] for line in lines if line.startswith("complete ")]
-    assert ends == ["kinarm-arms", "kinarm-eval"]

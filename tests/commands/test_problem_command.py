@@ -54,7 +54,7 @@ def test_check_of_the_papers_third_task(run, write, tmp_path):
     answer = run("kinarm-problem", "check", "both", "--trials", 20, "--picture", "a.png")
     assert (answer.status, answer.err) == (0, "")
     assert "reached 100.0 % (86.1..100.0), out of reach 0.0 %" in answer.out
-    assert "mirror   yes: the problem is its own image" in answer.out
+    assert "mirror   yes: arm and obstacles are their own image" in answer.out
     assert "at home nothing touches" in answer.out
     assert imread(tmp_path / "a.png").shape[:2] == (640, 960)
     again = run("kinarm-problem", "check", "both", "--picture", "a.png")

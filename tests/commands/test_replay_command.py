@@ -1,6 +1,5 @@
 """``kinarm-replay``: pages from policies and recordings."""
 
-
 import numpy as np
 import pytest
 from documents import outcomes_of
@@ -57,8 +56,6 @@ def test_the_best_policy_for_a_problem(replay, options, problem):
     assert f"{problem} 0, {best_policy(problem)}: " in answer.out
 
 
-
-
 def test_two_policies_on_the_same_trials(replay, tmp_path):
     answer = replay("--compare", "random", "zero", "--problem", "left", "--trials", 2, *QUICK)
     assert played(answer) == [0, 0, 1, 1]
@@ -113,10 +110,6 @@ def test_recordings_do_not_hold_it(replay, recordings):
     check_refused(replay(recordings, "--policy", "nobody"), "'nobody'", "mine-seed0")
     check_refused(replay(recordings, "--problem", "left"), "holds no recording")
     check_refused(replay(recordings, "--trial", 9), "no trial 9", "0 to 3")
-    answer = replay(evaluation, "--policy", "mine-seed0")
-    check_refused(answer, "is a file: name it with --policy")
-
-
 
 
 class TestPlayground:

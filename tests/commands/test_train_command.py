@@ -111,10 +111,11 @@ def test_a_setting_without_effect_is_told(run, tmp_path, options, line):
 
 def test_a_recipe_and_a_problem_from_files(run, tmp_path):
     PROBLEMS["left"].replace(tolerance=0.1, name="near").save(tmp_path / "near.toml")
-    (tmp_path / "mine.toml").write_text('problem = "near.toml"\niterations = 3\nseed = 5\n')
+    (tmp_path / "mine.toml").write_text("iterations = 3\n")
     out = tmp_path / "p.npz"
-    arguments = ("ars", "--recipe", tmp_path / "mine.toml", "--horizon", 9, "--out", out)
-    assert run("kinarm-train", *arguments).status == 0
+    files = ("--recipe", tmp_path / "mine.toml", "--problem", tmp_path / "near.toml")
+    arguments = ("--seed", 5, "--horizon", 9, "--out", out)
+    assert run("kinarm-train", "ars", *files, *arguments).status == 0
     made = Policy.load(out).provenance
     assert (made.recipe, made.seed, made.config["iterations"]) == ("mine", 5, 3)
     assert made.problem == PROBLEMS["left"].replace(name="near", tolerance=0.1, horizon=9).pinned

@@ -23,7 +23,6 @@ PROGRAMS = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["scri
 
 EXCEPTIONS = {
     r"make ": "does what .ci/run does; that the targets exist is tested beside the README",
-    r"kinarm --print-completion": "writes into the home; tests/kinarm/test_command_line.py",
     r"kinarm-eval --trials 200( --markdown)?$": "make eval does it",
     r"pip install": "changes the installation",
     r"pip download|tar -x|kinarm-problem import .*ur5": "needs a download; tests/kinarm",

@@ -118,28 +118,6 @@ class TestModel:
         expected = evaluate(Policy.from_sb3(tmp_path / "model.zip", "right"), trials=10)
         np.testing.assert_array_equal(evaluation.rollouts.distance, expected.rollouts.distance)
 
-    @pytest.mark.parametrize(
-        ("model_file", "statistics"),
-        [
-            ("rl_model_500_steps.zip", "rl_model_vecnormalize_500_steps.pkl"),
-            ("kinarm-ReachRight-v0_1/model.zip", "kinarm-ReachRight-v0_1/kinarm-ReachRight-v0/"),
-        ],
-    )
-    def test_statistics_that_bear_its_name_are_used_and_told(
-        self, model, tmp_path, model_file, statistics
-    ):
-        path, beside = tmp_path / model_file, tmp_path / statistics
-        if beside.suffix != ".pkl":
-            beside = beside / "vecnormalize.pkl"
-        beside.parent.mkdir(parents=True, exist_ok=True)
-        model.save(path)
-        model.get_vec_normalize_env().save(beside)
-        (contestant,) = find_contestants(path, "right")
-        assert contestant.note == f"{path.stem}: observations normalised by {beside}"
-        own = Policy.from_sb3(model)
-        seen = np.random.default_rng(0).normal(size=(20, 48))
-        np.testing.assert_array_equal(contestant.policy(seen), own(seen))
-
     @pytest.mark.parametrize("learnt", [False, True])
     def test_statistics_that_lie_beside_it_may_be_those_of_another(self, model, tmp_path, learnt):
         """They are not even opened, and a model that needs some is refused."""

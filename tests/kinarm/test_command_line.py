@@ -1,7 +1,6 @@
-"""How commands run and end, their options, and what help and completions say of them."""
+"""How commands run and end, their options, and what help says of them."""
 
 import os
-import shutil
 import subprocess
 import sys
 from dataclasses import dataclass, field
@@ -11,9 +10,8 @@ from typing import Literal
 import pytest
 
 from kinarm._command_line import add_options, given_options, run_command, run_request
-from kinarm._parser import SHELLS, Parser, completion_script
+from kinarm._parser import Parser
 from kinarm.errors import ArmError, WorkerError
-from kinarm.evaluation.replay.request import ReplayRequest
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -182,54 +180,3 @@ class TestOptions:
         assert said.out == ""
         assert said.err.startswith(f"bake: {message}")
         assert said.err.count("\n") == 1
-
-
-def script(shell, kind=Baking):
-    """A script with which a shell completes the options of a command within another."""
-    pytest.importorskip("shtab")
-    parser = Parser(prog="bake")
-    add_options(parser, kind)
-    return completion_script(parser, shell)
-
-
-@pytest.mark.parametrize("shell", SHELLS)
-def test_options_are_completed(shell):
-    text = script(shell)
-    for word in ("quiet", "shape", "loaf", "Ann", "print-completion"):
-        assert word in text
-    assert ("Where it goes" in text) is (shell != "bash")
-
-
-@pytest.mark.parametrize("shell", SHELLS)
-def test_shells_accept_their_scripts(shell, tmp_path):
-    if shutil.which(shell) is None:
-        pytest.skip(f"{shell} is not installed")
-    (tmp_path / "script").write_text(script(shell, ReplayRequest))
-    done = subprocess.run([shell, "-n", tmp_path / "script"], capture_output=True, check=False)
-    assert (done.returncode, done.stderr) == (0, b"")
-
-
-def completed(tmp_path, *words):
-    """What bash offers after some words."""
-    (tmp_path / "script").write_text(script("bash"))
-    (tmp_path / "folder").mkdir(exist_ok=True)
-    (tmp_path / "file").touch()
-    ask = f"""
-    source ./script
-    COMP_WORDS=({" ".join(words)} "") COMP_CWORD={len(words)}
-    function_name=$(complete -p bake | sed 's/.*-F \\([^ ]*\\).*/\\1/')
-    $function_name bake "" "{words[-1]}"
-    printf '%s\\n' "${{COMPREPLY[@]}}"
-    """
-    done = subprocess.run(
-        ["bash", "-c", ask], capture_output=True, text=True, check=True, cwd=tmp_path
-    )
-    return set(done.stdout.split("\n")) - {""}
-
-
-def test_bash_completes_names_files_and_choices(tmp_path):
-    assert completed(tmp_path, "bake", "--shape") == {"loaf", "roll"}
-    assert {"Ann", "file"} <= completed(tmp_path, "bake", "--names")
-    found = {word.rstrip("/") for word in completed(tmp_path, "bake", "--output")}
-    assert "folder" in found
-    assert "file" not in found

@@ -8,6 +8,7 @@ from importlib import metadata
 import pytest
 
 from kinarm import SEMANTICS
+from kinarm._fields import from_plain, to_plain
 from kinarm.errors import InvalidInputError
 from kinarm.policies.provenance import (
     Provenance,
@@ -19,10 +20,10 @@ from kinarm.problem import ReachProblem
 
 @pytest.mark.parametrize("entry", ["algorithm", "problem"])
 def test_missing_entry_is_named(provenance, entry):
-    entries = provenance.to_json()
+    entries = to_plain(provenance)
     del entries[entry]
     with pytest.raises(InvalidInputError, match=f"provenance: '{entry}' is missing: "):
-        Provenance.from_json(entries)
+        from_plain(Provenance, entries, "provenance")
 
 
 @dataclass(frozen=True)
@@ -49,7 +50,8 @@ def test_of_a_training_here_and_now():
         semantics=SEMANTICS,
     )
     assert made.problem.arm.digest == problem.arm_digest
-    assert Provenance.from_json(json.loads(json.dumps(made.to_json()))) == made
+    stored = json.loads(json.dumps(to_plain(made)))
+    assert from_plain(Provenance, stored, "provenance") == made
 
 
 def test_versions_of_what_matters():
@@ -61,9 +63,9 @@ def test_versions_of_what_matters():
 
 def test_the_semantics_of_an_older_file_are_unknown(provenance):
     assert provenance.semantics is None
-    assert "semantics" not in provenance.to_json()
+    assert "semantics" not in to_plain(provenance)
     known = replace(provenance, semantics="3")
-    assert Provenance.from_json(known.to_json()) == known
+    assert from_plain(Provenance, to_plain(known), "provenance") == known
 
 
 def test_without_git_the_commit_is_unknown(monkeypatch):

@@ -108,15 +108,6 @@ class TestFile:
         expected = recipe("ppo", net_arch=(8, 4), training_tolerance=0.02, recipe="mine")
         assert recipe("ppo", path) == expected
 
-    def test_it_may_name_problem_and_seed(self, write):
-        PROBLEMS["left"].replace(tolerance=0.03).save(write("", "near.toml"))
-        path = write('problem = "near.toml"\nseed = 8\n')
-        config = recipe("ars", path)
-        assert (config.problem.name, config.problem.task.tolerance) == ("left", 0.03)
-        assert (config.seed, config.recipe) == (8, "mine")
-        config = recipe("ars", path, problem="both", seed=1)
-        assert (config.problem, config.seed, config.recipe) == (PROBLEMS["both"], 1, "mine")
-
     def test_changes_are_on_top(self, write):
         path = write("noise = 0.5\n")
         assert recipe("ars", path, noise=0.25).recipe == "mine*"
@@ -131,6 +122,7 @@ class TestFile:
                 'base = "taught"',
                 "mine.toml: base must be one of paper, tuned, linear, best, v1, brs, got 'taught'",
             ),
+            ("seed = 8", "mine.toml: a recipe has no seed; give it as --seed"),
             ("noise =", "mine.toml: not a recipe file: "),
         ],
     )

@@ -96,8 +96,6 @@ def test_a_lost_worker(tmp_path):
     assert sorted(LocalExecutor(2).map(square, range(3))) == [(0, 0), (1, 1), (2, 4)]
 
 
-
-
 @needs_ray
 @pytest.mark.parametrize("address", [NOBODY, f"ray://{NOBODY}", "nowhere", "auto"])
 def test_no_cluster(address, monkeypatch):
