@@ -1,7 +1,6 @@
 """How commands run and end, their options, and what help and completions say of them."""
 
 import os
-import shutil
 import subprocess
 import sys
 from dataclasses import dataclass, field
@@ -13,7 +12,6 @@ import pytest
 from kinarm._command_line import add_options, given_options, run_command, run_request
 from kinarm._parser import SHELLS, Parser, completion_script
 from kinarm.errors import ArmError, WorkerError
-from kinarm.evaluation.replay.request import ReplayRequest
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -184,11 +182,11 @@ class TestOptions:
         assert said.err.count("\n") == 1
 
 
-def script(shell, kind=Baking):
+def script(shell):
     """A script with which a shell completes the options of a command within another."""
     pytest.importorskip("shtab")
     parser = Parser(prog="bake")
-    add_options(parser, kind)
+    add_options(parser, Baking)
     return completion_script(parser, shell)
 
 
@@ -198,15 +196,6 @@ def test_options_are_completed(shell):
     for word in ("quiet", "shape", "loaf", "Ann", "print-completion"):
         assert word in text
     assert ("Where it goes" in text) is (shell != "bash")
-
-
-@pytest.mark.parametrize("shell", SHELLS)
-def test_shells_accept_their_scripts(shell, tmp_path):
-    if shutil.which(shell) is None:
-        pytest.skip(f"{shell} is not installed")
-    (tmp_path / "script").write_text(script(shell, ReplayRequest))
-    done = subprocess.run([shell, "-n", tmp_path / "script"], capture_output=True, check=False)
-    assert (done.returncode, done.stderr) == (0, b"")
 
 
 def completed(tmp_path, *words):
