@@ -85,15 +85,6 @@ def test_replacements_are_shares_of_the_commands_step():
     assert found > 50
 
 
-def test_results_depend_on_the_episode_alone(simulator):
-    actions, starts, goals = drawn(simulator, 60, seed=3)
-    shielded, rows = simulator.shielded(), np.arange(2, 60, 5)
-    whole = shielded.rollout_actions(actions, starts, goals)
-    part = shielded.rollout_actions(actions[rows], starts[rows], goals[rows])
-    for name in ("configurations", "steps", "returns", "interventions"):
-        np.testing.assert_array_equal(getattr(whole, name)[rows], getattr(part, name))
-
-
 def test_joints_settle_as_far_as_is_claimed(simulator):
     """From states where no limit acts, the reference goes no farther than |e| + swing / rate."""
     world, rng, n = simulator.world, np.random.default_rng(4), simulator.n_actions

@@ -1,7 +1,6 @@
 """Pictures: what is where, in light and shadow, held against formulas."""
 
 import math
-import sys
 
 import numpy as np
 import pytest
@@ -9,9 +8,9 @@ import pytest
 from kinarm.arm import Arm
 from kinarm.collision import Contact
 from kinarm.contact_pairs import body_names
-from kinarm.errors import InvalidInputError, MissingExtraError
+from kinarm.errors import InvalidInputError
 from kinarm.problem import ReachProblem
-from kinarm.viewer import Camera, Renderer, canvas
+from kinarm.viewer import Camera, Renderer
 from kinarm.viewer.parts import SUN_PLACE
 
 pytest.importorskip("raylib")
@@ -183,10 +182,3 @@ class TestCamera:
 def test_bad_input(renderer, changes, message):
     with pytest.raises(InvalidInputError, match=message):
         renderer.render(**{"configuration": HOME, "goal": GOAL, **changes})
-
-
-def test_want_of_the_extra_is_told(renderer, monkeypatch):
-    monkeypatch.setitem(sys.modules, "raylib", None)
-    monkeypatch.setattr(canvas, "_raylib", canvas._raylib.__wrapped__)
-    with pytest.raises(MissingExtraError, match="raylib-software is not installed: pip install"):
-        renderer.render(HOME, GOAL)
