@@ -16,10 +16,9 @@ TOLERANCE, INTERPRETED = 0.05, 0.1
 of_x86_64 = pytest.mark.skipif(platform.machine() != "x86_64", reason="counted on x86-64")
 
 
-@pytest.mark.slow
+@pytest.mark.rare
 @of_x86_64
 def test_bits_are_those_of_this_processor():
-    """What is compiled for it here is counted below."""
     assert computed_bits(TARGET) == usual_bits()
 
 

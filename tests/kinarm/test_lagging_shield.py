@@ -130,11 +130,11 @@ def test_arms_stay_away_from_bodies_that_move(plant):
 
 
 @pytest.mark.slow
-def test_a_million_random_steps_touch_nothing():
+def test_hundreds_of_thousands_of_random_steps_touch_nothing():
     simulator = Simulator("right").with_plant("hard").shielded()
     steps = 0
-    for seed in range(16):
+    for seed in range(4):
         rollouts = simulator.rollout_actions(*drawn(simulator, 1000, seed=100 + seed))
         assert not rollouts.collision.any()
         steps += int(rollouts.steps.sum())
-    assert steps > 1_000_000
+    assert steps > 250_000
