@@ -81,7 +81,6 @@ class Watched:
         self.page.on("pageerror", lambda error: self.complaints.append(str(error)))
         self.page.on("console", self._listen)
         self.page.goto(path.as_uri())
-        self.page.wait_for_selector("body[data-ready]")
 
     def _listen(self, message: object) -> None:
         if message.type == "error" or "THREE" in message.text:
@@ -108,23 +107,37 @@ class Watched:
 
 
 @pytest.fixture(scope="session")
+def watch(new_context: Callable[..., object]) -> Callable[..., AbstractContextManager[Watched]]:
+    """Open any page for the length of a ``with`` block."""
+
+    @contextmanager
+    def watched(path: Path, **settings: object) -> Iterator[Watched]:
+        context = new_context(**settings)
+        yield Watched(context, path)
+        context.close()
+
+    return watched
+
+
+@pytest.fixture(scope="session")
 def visit(
-    new_context: Callable[..., object],
+    watch: Callable[..., AbstractContextManager[Watched]],
 ) -> Callable[..., AbstractContextManager[Watched]]:
-    """Open a page for the length of a ``with`` block."""
+    """Open a replay page for the length of a ``with`` block, and wait until it is ready."""
 
     @contextmanager
     def visited(
         path: Path, size: tuple[int, int] = (800, 600), *, calm: bool = True, drawn: bool = False
     ) -> Iterator[Watched]:
-        context = new_context(
-            drawn=drawn,
-            viewport={"width": size[0], "height": size[1]},
-            color_scheme="light",
-            reduced_motion="reduce" if calm else "no-preference",
-        )
-        yield Watched(context, path)
-        context.close()
+        settings = {
+            "drawn": drawn,
+            "viewport": {"width": size[0], "height": size[1]},
+            "color_scheme": "light",
+            "reduced_motion": "reduce" if calm else "no-preference",
+        }
+        with watch(path, **settings) as opened:
+            opened.page.wait_for_selector("body[data-ready]")
+            yield opened
 
     return visited
 

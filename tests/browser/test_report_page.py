@@ -1,6 +1,7 @@
 """The report in a real browser: offline, quiet, dark and light, on a phone, with its replay."""
 
 import time
+from contextlib import ExitStack
 from pathlib import Path
 
 import pytest
@@ -49,33 +50,24 @@ def chosen(document, evaluations):
 
 
 @pytest.fixture(scope="module")
-def address(document, evaluations, tmp_path_factory) -> str:
-    return write_report(tmp_path_factory.mktemp("report"), document, evaluations).as_uri()
+def report(document, evaluations, tmp_path_factory) -> Path:
+    return write_report(tmp_path_factory.mktemp("report"), document, evaluations)
 
 
 @pytest.fixture
-def visit(new_context, address):
+def visit(watch, report):
     """Open the report without network or motion; nothing may be fetched or go wrong."""
-    contexts, requests, problems = [], [], []
+    opened = []
+    with ExitStack() as stack:
 
-    def call(**settings):
-        context = new_context(reduced_motion="reduce", **settings)
-        contexts.append(context)
-        page = context.new_page()
-        page.on("request", lambda request: requests.append(request.url))
-        page.on("pageerror", lambda error: problems.append(str(error)))
-        page.on(
-            "console",
-            lambda message: problems.append(message.text) if message.type == "error" else None,
-        )
-        page.goto(address)
-        return page
+        def call(**settings):
+            opened.append(stack.enter_context(watch(report, reduced_motion="reduce", **settings)))
+            return opened[-1].page
 
-    yield call
-    for context in contexts:
-        context.close()
-    assert problems == []
-    assert [url for url in requests if url != address and not url.startswith("data:")] == []
+        yield call
+    for each in opened:
+        assert each.complaints == []
+        assert [url for url in each.requests if not url.startswith("data:")] == [report.as_uri()]
 
 
 def wait_until(page, condition: str, seconds: float = 60):

@@ -30,6 +30,7 @@ EXCEPTIONS = {
     r"python -m tests\.campaign": "takes hours; tests/campaign runs a share of each",
     r"python -m docs\.measurements": "measures for minutes; tests/docs/test_measurements.py",
     r"python tests/instructions": "records anew; tests/instructions compares",
+    r"python -m rl_zoo3\.(record_video|cli)": "needs a training; rl-zoo3's own films and plots",
     r"kinarm-bench": "measures for minutes; tests/commands/test_bench_command.py",
     r"kinarm-reproduce|.*ReproductionRequest": "trains for half an hour; tests/commands",
     r"kinarm-study .*--(ray|slurm)": "needs a cluster; tests/evaluation/experiments",

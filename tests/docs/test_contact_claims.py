@@ -11,6 +11,8 @@ from kinarm.collision import ContactModel
 from kinarm.problem import ReachProblem
 from kinarm.reference import ReferenceSimulator
 
+pytestmark = pytest.mark.rare
+
 
 def test_it_goes_on_where_it_ended(tmp_path, monkeypatch):
     parts = {part: (check, 3, most) for part, (check, _, most) in contact_claims.PARTS.items()}

@@ -63,28 +63,6 @@ def page(runs):
     page.close()
 
 
-def test_files_are_there_for_later_blocks(page):
-    page.write("mine.toml", 'arm = "paper"')
-    assert page.run_commands("cat mine.toml") == 'arm = "paper"\n'
-
-
-def test_blocks_share_names_and_a_folder_and_their_prints_are_kept(page):
-    assert page.run_python("from pathlib import Path\nmade = Path('made.txt')") == ""
-    assert page.run_python("made.write_text('made')\nprint(made)") == "made.txt\n"
-    assert page.run_commands("cat made.txt") == "made"
-    assert page.read("made.txt") == b"made"
-
-
-def test_a_cell_shows_its_last_value_and_its_figures(page):
-    assert page.run_cell("x = 2\nprint(1)\nx") == ("1\n2\n", "")
-    assert page.run_cell("x;") == page.run_cell("None") == page.run_cell("x = 3") == ("", "")
-    drawn = "import matplotlib.pyplot as plt\nplt.plot([1, x]);"
-    printed, made = page.run_cell(drawn)
-    assert printed == ""
-    assert made.startswith('<img src="data:image/png;base64,')
-    assert page.run_cell("x") == ("3\n", "")  # the figure is not shown again
-
-
 def test_a_block_that_fails_says_where(page, runs):
     with pytest.raises(NameError) as caught:
         page.run_python("x = 1\nunknown", line=30)
@@ -98,8 +76,3 @@ def test_a_command_that_is_to_fail_shows_its_message(page, runs):
     assert "no-such-file" in page.run_commands("cat no-such-file", fails=True)
     with pytest.raises(runs.ExtensionError, match="were to fail"):
         page.run_commands("echo done", fails=True)
-
-
-def test_films_and_pictures_refer_to_nothing_outside(runs):
-    assert runs.shown("a/film.mp4", b"film").startswith('<video src="data:video/mp4;base64,Zmls')
-    assert runs.shown("picture.png", b"film").startswith('<img src="data:image/png;base64,Zmls')

@@ -77,13 +77,6 @@ def test_impossible_ones_are_refused(changes, message):
 
 
 class TestScenes:
-    def test_survive_files(self, tmp_path):
-        scene = random_scene(4, 12)
-        problem = ReachProblem.load("both").replace(scene=scene, name="all")
-        problem.save(tmp_path / "all.toml")
-        assert ReachProblem.load(tmp_path / "all.toml") == problem
-        assert ReachProblem.load(tmp_path / "all.toml").digest == problem.digest
-
     def test_boxes_by_corners_are_the_same_as_by_centre(self):
         corners = Obstacle(name="a", lower=(0.2, 0.1, 0), upper=(0.6, 0.3, 0.5), yaw=0.4)
         size, centre = (0.4, 0.2, 0.5), (0.4, 0.2, 0.25)

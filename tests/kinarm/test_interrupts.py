@@ -8,22 +8,14 @@ import textwrap
 
 import pytest
 
-from kinarm import _interrupts
-
 BEFORE = """
-import atexit, os, signal, sys, time
+import os, signal, sys, time
 from kinarm._command_line import run_command
 from kinarm._interrupts import telling
 
 def ask(request=signal.SIGINT):
     os.kill(os.getpid(), request)
     time.sleep(0)
-
-def eat():
-    try:
-        ask()
-    except BaseException:
-        pass
 
 """
 
@@ -61,48 +53,6 @@ INTERRUPTED = 130, "", "bake: interrupted\n"
 @pytest.mark.parametrize("name", ["SIGINT", "SIGTERM", "SIGHUP"])
 def test_a_command_says_so_in_one_line(run, name):
     assert run(f"run_command('bake', lambda: ask(signal.{name}))") == INTERRUPTED
-
-
-@pytest.mark.parametrize(
-    "source",
-    [
-        """
-        def command():  # as numpy.unique(axis=0) does
-            try:
-                ask()
-            except KeyboardInterrupt:
-                raise TypeError("not supported")
-        """,
-        """
-        def command():  # the next one is answered
-            eat()
-            ask()
-        """,
-        """
-        def command():
-            try:
-                ask()
-            finally:
-                ask()
-                try:
-                    raise ValueError
-                except ValueError:
-                    ask(signal.SIGTERM)
-        """,
-        """
-        @atexit.register
-        def bye():
-            ask()
-            ask(signal.SIGTERM)
-
-        def command():
-            ask()
-        """,
-    ],
-    ids=("made another", "lost", "thrice", "at exit"),
-)
-def test_however_it_comes_and_whatever_becomes_of_it(run, source):
-    assert run(textwrap.dedent(source) + "\nrun_command('bake', command)\n") == INTERRUPTED
 
 
 def test_what_is_left_is_told(run):
@@ -152,18 +102,3 @@ def test_children_that_are_kept_from_it(run):
     run_command('bake', ask)
     """
     assert run(source) == INTERRUPTED
-
-
-@pytest.mark.parametrize(
-    ("program", "words", "expected"),
-    [
-        ("/x/kinarm-eval", ["python", "/x/kinarm-eval", "--help"], True),
-        ("-m", ["python", "-m", "kinarm.viewer"], True),
-        ("-m", ["python", "-X", "importtime", "-Im", "kinarm"], True),
-        (None, ["python"], False),
-    ],
-)
-def test_which_processes_are_commands(monkeypatch, program, words, expected):
-    monkeypatch.setattr(sys, "argv", [] if program is None else [program])
-    monkeypatch.setattr(sys, "orig_argv", words)
-    assert _interrupts.is_command() is expected

@@ -8,7 +8,7 @@ import pytest
 
 from kinarm.arm import Arm
 from kinarm.arm_specification import ArmSpecification
-from kinarm.errors import InvalidInputError, MissingExtraError
+from kinarm.errors import InvalidInputError
 from kinarm.moveit import import_problem
 from kinarm.problem import ReachProblem
 from kinarm.scene import Mount
@@ -235,9 +235,3 @@ def test_goal_inside_an_obstacle(imported):
     pose = {"position": PAPER.tool_position(GOAL).tolist(), "orientation": [0, 0, 0, 1]}
     with pytest.raises(InvalidInputError, match=r"scene1\.yaml: .*lies inside obstacle 'thing'"):
         imported(with_objects(an_object(pose=pose)))
-
-
-def test_missing_library_is_named(imported, monkeypatch):
-    monkeypatch.setitem(__import__("sys").modules, "yaml", None)
-    with pytest.raises(MissingExtraError, match=r"PyYAML .*kinarm\[robots\]"):
-        import_problem(*["nothing.yaml"] * 2, ArmSpecification(), Mount())

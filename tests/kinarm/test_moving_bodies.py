@@ -15,7 +15,7 @@ from kinarm.bodies import Body, RandomBodies
 from kinarm.errors import KinarmError
 from kinarm.policies import Oracle
 from kinarm.policies.mirror import obstacles_are_symmetric
-from kinarm.problem import PROBLEMS, ReachProblem
+from kinarm.problem import PROBLEMS
 from kinarm.recording import record_path, record_rollouts
 from kinarm.scene import PAPER_BENCHES, Scene
 from kinarm.simulator import Simulator
@@ -115,12 +115,6 @@ def test_impossible_motions_are_refused(given, message):
         BodyMotion(**given)
 
 
-def test_problems_survive_files(tmp_path):
-    made = busy().replace(name="moving")
-    made.save(tmp_path / "moving.toml")
-    assert ReachProblem.load(tmp_path / "moving.toml") == made
-
-
 class TestEpisodes:
     def test_are_those_of_the_reference(self, changing):
         _, collisions, count = compare_actions(changing, 3, 60, held=12)
@@ -155,19 +149,6 @@ class TestEpisodes:
         ends = [bool(passing.step(later, rest).collision[0]) for _ in range(3)]
         assert ends == [False, False, True]
         assert later.steps[0] == whole.steps[0]
-
-    def test_results_do_not_depend_on_batches(self, changing):
-        rng = np.random.default_rng(2)
-        starts, goals = changing.sample(rng, 400)
-        actions = np.repeat(rng.uniform(-1, 1, (400, 8, 5)), 8, axis=1)
-        together = changing.rollout_actions(actions, starts, goals)
-        order = rng.permutation(400)[:100]
-        others = Simulator(changing.problem, threads=2)
-        some = others.rollout_actions(actions[order], starts[order], goals[order])
-        for name in ("returns", "steps", "configurations", "collision"):
-            np.testing.assert_array_equal(getattr(some, name), getattr(together, name)[order])
-        touched = {pair[1].split()[0] for pair in changing.contact_pairs(together) if pair}
-        assert touched >= {"ball", *(body.name for body in SOLID)}
 
 
 class TestOracle:

@@ -6,7 +6,7 @@ from reference_episodes import assert_equal_outcome, held_actions, scripted
 from scipy.integrate import solve_ivp
 
 from kinarm.errors import KinarmError
-from kinarm.plant import Plant, plant_names
+from kinarm.plant import Plant
 from kinarm.problem import ReachProblem
 from kinarm.reference import ReferenceSimulator
 from kinarm.simulator import Simulator
@@ -173,19 +173,6 @@ def test_rollouts_equal_the_reference(change):
         np.testing.assert_allclose([each[i] for each in seen[: len(last)]], last, atol=1e-12)
 
 
-def test_results_depend_on_the_episode_alone():
-    alone, shared = (Simulator("both", threads=n).with_plant(Plant(**EVERYTHING)) for n in (1, 3))
-    rng = np.random.default_rng(5)
-    starts, goals = shared.sample(rng, 3000)
-    actions = held_actions(shared, rng, 3000)
-    whole = shared.rollout_actions(actions, starts, goals)
-    rows = np.arange(7, 2000, 13)
-    part = alone.rollout_actions(actions[rows], starts[rows], goals[rows])
-    for name in ("configurations", "targets", "steps", "returns", "distance"):
-        np.testing.assert_array_equal(getattr(whole, name)[rows], getattr(part, name))
-    assert len(np.unique(whole.steps)) > 10
-
-
 def test_episodes_that_go_on_keep_their_state():
     simulator = simulator_with(**EVERYTHING)
     starts, goals = simulator.sample(np.random.default_rng(6), 50)
@@ -207,15 +194,6 @@ def test_ideal_plants_change_nothing():
     assert problem.replace(plant="ideal").digest == problem.digest
     assert Plant(feedback="commanded").ideal
     assert not Plant(delay=1).ideal
-
-
-@pytest.mark.parametrize("name", plant_names())
-def test_shipped_plants_survive_files(name, tmp_path):
-    problem = ReachProblem.load("both").replace(plant=name, horizon=50)
-    problem.save(tmp_path / "mine.toml")
-    assert ReachProblem.load(tmp_path / "mine.toml").first_difference(problem) is None
-    (tmp_path / "named.toml").write_text(f'base = "both"\nplant = "{name}"\n')
-    assert ReachProblem.load(tmp_path / "named.toml").plant == problem.plant
 
 
 @pytest.mark.parametrize(

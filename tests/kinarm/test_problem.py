@@ -7,9 +7,9 @@ import shutil
 import tomllib
 
 import pytest
+from random_scenes import CLUTTER, random_scene, swinging
 
 from kinarm.arm import ArmSpecification
-from kinarm.bodies import RandomBodies
 from kinarm.errors import KinarmError, ProblemError, UnknownNameError
 from kinarm.problem import PROBLEMS, ReachProblem
 from kinarm.scene import PAPER_BENCHES, GoalRegion, Mount, Scene
@@ -45,8 +45,8 @@ class TestPapersProblems:
 
 OTHER_REGION = GoalRegion(name="right", lower=(-0.5, -0.75, 0.4), upper=(0.5, -0.55, 0.4))
 TURNED = (dataclasses.replace(PAPER_BENCHES[0], yaw=0.1), PAPER_BENCHES[1])
-SIZES = {"smallest": (0.1,), "largest": (0.2,), "lower": (0, 0, 0), "upper": (1, 1, 1)}
-BALL = RandomBodies(name="ball", shape="sphere", **SIZES)
+BODIES = (*PAPER_BENCHES, *random_scene(4, 12, moving=6).obstacles)
+DRAWN = (CLUTTER, swinging(0.3))
 CHANGES = {
     "task.goal_regions[0]": {"task": "left"},
     "task.goal_regions[1]": {"goal_regions": ("right", "left")},
@@ -68,12 +68,14 @@ CHANGES = {
     "scene.obstacles[0].name": {"scene": Scene(obstacles=())},
     "scene.mount.position[0]": {"scene": Scene(mount=Mount(position=(0.1, 0, 0)))},
     "scene.obstacles[0].yaw": {"scene": Scene(obstacles=TURNED)},
-    "scene.random_bodies[0].name": {"scene": Scene(random_bodies=(BALL,))},
+    "scene.obstacles[2].name": {"scene": Scene(obstacles=BODIES)},
+    "scene.random_bodies[0].name": {"scene": Scene(random_bodies=DRAWN)},
     "scene.seed": {"scene": Scene(seed=1)},
     "task.reachable_goals": {"reachable_goals": True},
     "task.starts[0][0]": {"starts": ((0.1, 0, 0, 0, 0, 0),)},
     "scene.goal_regions[0].lower[2]": {"scene": Scene(goal_regions=(OTHER_REGION,))},
     "arm": {"arm": "paper_flange"},
+    "plant.delay[0]": {"plant": "hard"},
 }
 
 

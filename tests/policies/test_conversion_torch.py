@@ -1,13 +1,10 @@
 """Networks of PyTorch as policies: the same actions, and what is refused."""
 
-import sys
-
 import numpy as np
 import pytest
 
-from kinarm.errors import InvalidInputError, MissingExtraError
+from kinarm.errors import InvalidInputError
 from kinarm.policies import Policy
-from kinarm.policies.conversion.layers import module_pieces
 
 torch = pytest.importorskip("torch")
 nn = torch.nn
@@ -97,9 +94,3 @@ def test_parameters_that_are_not_finite():
     module.weight.data[0, 0] = torch.nan
     with pytest.raises(InvalidInputError, match="weights of layer 0 must be finite"):
         Policy.from_torch(module, "right")
-
-
-def test_without_torch_the_extra_is_named(monkeypatch):
-    monkeypatch.setitem(sys.modules, "torch", None)
-    with pytest.raises(MissingExtraError, match=r"kinarm\[sb3\]"):
-        next(module_pieces(nn.Tanh()))

@@ -1,12 +1,9 @@
 """Searches by Optuna: as many settings as asked for, and nothing stuck after an interruption."""
 
-import sys
-
 import pytest
 from small_studies import SMALL
 
-from kinarm.errors import InvalidInputError, MissingExtraError
-from kinarm.evaluation.experiments import search as searches
+from kinarm.errors import InvalidInputError
 from kinarm.evaluation.experiments import study as studies
 from kinarm.evaluation.experiments.executors import LocalExecutor
 from kinarm.evaluation.experiments.experiment import Experiment
@@ -139,10 +136,3 @@ def test_refused(changes, words):
 def test_unknown_fields(tmp_path):
     with pytest.raises(InvalidInputError, match="unknown field of a recipe or problem 'stepsize'"):
         Study({**SEARCH, "search": {"count": 1, "stepsize": [1]}}, tmp_path)
-
-
-def test_without_the_extra(tmp_path, monkeypatch):
-    monkeypatch.setitem(sys.modules, "optuna", None)
-    specification = Experiment.from_json(SEARCH, "study")
-    with pytest.raises(MissingExtraError, match=r"kinarm\[tune\]"):
-        searches._open_search(specification, tmp_path)

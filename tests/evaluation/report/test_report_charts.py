@@ -108,15 +108,6 @@ class TestMap:
             seen.add(outcomes[trial])
         assert len(seen) > 1
 
-    def test_words_are_about_all_seeds_and_outcomes_are_the_worst(self, page, right):
-        group, markers = right.contenders[0], markers_of(drawn_map(page))
-        for trial, shown in enumerate(charts.worst_outcomes(group)):
-            outcomes = [member.outcomes[trial] for member in group.members]
-            assert shown == next(o for o in ("collision", "truncated", "success") if o in outcomes)
-            reached, mean = outcomes.count("success"), group.distances[:, trial].mean()
-            words = f": {reached} of 3 seeds reached it, mean {mean:.3f} m"
-            assert markers[trial].findtext("title").endswith(words)
-
     def test_regions_obstacles_and_base_are_to_scale(self, page, right):
         drawn = drawn_map(page)
         (region,), view = right.goal_regions, charts.View.of(right.goal_regions)
@@ -137,16 +128,6 @@ class TestMap:
         assert float(rect.get("x")) > float(base.get("cx"))
         assert float(base.get("cx")) == pytest.approx(view.y[1] * charts.SCALE)
         assert float(base.get("cy")) == pytest.approx(view.x[1] * charts.SCALE)
-
-    def test_failures_are_counted_where_they_happen(self, right):
-        group, (region,) = right.contenders[0], right.goal_regions
-        goals = group.members[0].trials.goals
-        width = (region.upper[0] - region.lower[0]) / charts.SLICES
-        for place, ((low, high), share) in enumerate(charts.failure_shares(group, region)):
-            assert (low, high) == pytest.approx((region.lower[0] + place * width, low + width))
-            inside = (low <= goals[:, 0]) & (goals[:, 0] < low + width)
-            failed = [not o for m in group.members for o in m.rollouts.success[inside]]
-            assert share == (pytest.approx(np.mean(failed)) if failed else None)
 
     @pytest.mark.parametrize(
         ("distance", "expected"),

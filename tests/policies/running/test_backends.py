@@ -8,7 +8,7 @@ from arm_libraries import FakeRTDE, FakeSO101, fake_lerobot
 from known_arms import INSTALLED
 
 from kinarm import ReachProblem, Simulator
-from kinarm.errors import InvalidInputError, MissingExtraError, RunStoppedError
+from kinarm.errors import InvalidInputError, RunStoppedError
 from kinarm.policies import load_policy
 from kinarm.policies.running.backend import Backend, WiredArm
 from kinarm.policies.running.check import ContractCheck
@@ -87,11 +87,6 @@ class TestUR:
         library.connected, library.stopped = True, True
         with pytest.raises(RunStoppedError, match="its controller has stopped it"):
             check.run()
-
-    def test_without_the_library(self, monkeypatch):
-        monkeypatch.setitem(sys.modules, "rtde_receive", None)
-        with pytest.raises(MissingExtraError, match="ur_rtde"):
-            URArm("10.0.0.2")
 
     def test_library_has_these_functions(self):
         control, receive = map(pytest.importorskip, ("rtde_control", "rtde_receive"))

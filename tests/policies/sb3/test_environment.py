@@ -3,22 +3,11 @@
 import numpy as np
 import pytest
 
+pytest.importorskip("stable_baselines3")
+
 from kinarm import PROBLEMS
-from kinarm.errors import InvalidInputError, MissingExtraError, UnknownNameError
+from kinarm.errors import InvalidInputError, UnknownNameError
 from kinarm.policies import sb3_vec_env
-
-
-class TestWithoutTheExtra:
-    def test_it_is_named_in_one_line(self, monkeypatch):
-        monkeypatch.setattr("kinarm.policies.learners.find_spec", lambda name: None)
-        with pytest.raises(MissingExtraError, match=r"pip install 'kinarm\[sb3\]'$"):
-            sb3_vec_env("right", 2)
-
-
-@pytest.fixture(autouse=True)
-def _sb3(request):
-    if request.cls is not TestWithoutTheExtra:
-        pytest.importorskip("stable_baselines3")
 
 
 class TestProblems:

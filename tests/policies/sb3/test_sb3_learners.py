@@ -3,11 +3,10 @@
 import numpy as np
 import pytest
 
-from kinarm.errors import InvalidInputError, MissingExtraError
+from kinarm.errors import InvalidInputError
 from kinarm.evaluation.commands import train
 from kinarm.policies import (
     Policy,
-    find_learner,
     load_checkpoint,
     recipe,
     save_checkpoint,
@@ -140,10 +139,3 @@ def test_a_recipe_file_and_a_change_replace_the_hyperparameters_that_they_name(t
         **tuned,
         "tau": 1.0,
     }
-
-
-def test_missing_packages_are_named(monkeypatch):
-    monkeypatch.setattr("kinarm.policies.learners.find_spec", lambda name: None)
-    for name, extra in (("sac", "sb3"), ("tqc", "zoo")):
-        with pytest.raises(MissingExtraError, match=f"kinarm\\[{extra}\\]"):
-            find_learner(name).check_installed()
