@@ -22,7 +22,6 @@ class Stream(StrEnum):
     PPO_SCENARIOS = "ppo scenarios"
     REPLAY = "replay"
     STUDY = "study"
-    DEMONSTRATIONS = "demonstrations"
 
 
 def stream_generator(stream: Stream, seed: int, *numbers: int) -> np.random.Generator:

@@ -16,7 +16,6 @@ from .learners import train_policy as train_policy
 from .library import load_policy as load_policy
 from .library import policy_names as policy_names
 from .normalizer import Normalizer as Normalizer
-from .oracle import Demonstrations as Demonstrations
 from .oracle import Oracle as Oracle
 from .oracle import OracleSolution as OracleSolution
 from .oracle import OracleSolutions as OracleSolutions

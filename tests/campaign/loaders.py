@@ -24,7 +24,7 @@ from kinarm.errors import KinarmError
 from kinarm.evaluation import EvaluationDocument, Study, oracle_bounds
 from kinarm.evaluation.finding import find_contestants
 from kinarm.meshes import hulls_of_mesh
-from kinarm.policies import Demonstrations, Policy, load_checkpoint, recipe
+from kinarm.policies import Policy, load_checkpoint, recipe
 from kinarm.policies.conversion.models import load_vec_normalize, sb3_model
 from kinarm.policies.learners import state_policy
 from kinarm.problem import ReachProblem
@@ -152,7 +152,6 @@ LOADERS: dict[str, Loader] = {
     "policy": Loader(samples.policies, damaged_archive, _policy),
     "checkpoint": Loader(samples.checkpoints, damaged_archive, _checkpoint),
     "recordings": Loader(samples.recordings, damaged_archive, load_recordings),
-    "demonstrations": Loader(samples.demonstrations, damaged_archive, Demonstrations.load),
     "bounds": Loader(_bounds_samples, damaged_archive, _bounds),
     "evaluation": Loader(samples.evaluations, damaged_json, _evaluation, "file.json"),
     "problem": Loader(

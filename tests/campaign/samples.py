@@ -11,7 +11,7 @@ import numpy as np
 from kinarm._files import shipped_files
 from kinarm.arm import Arm
 from kinarm.evaluation import EvaluationRequest, Study, TrialSet
-from kinarm.policies import Oracle, load_policy, recipe, save_checkpoint
+from kinarm.policies import load_policy, recipe, save_checkpoint
 from kinarm.policies.learners import training_states
 from kinarm.recording import record_rollouts, save_recordings
 from tests.helpers.mesh_files import CUBE_CORNERS, CUBE_FACES, write_obj, write_stl
@@ -55,11 +55,6 @@ def recordings() -> list[bytes]:
     rollouts = simulator.rollout(policy, trials().starts, trials().goals, record=True)
     recorded = record_rollouts(simulator, rollouts, "ars")
     return [written(lambda path: save_recordings(path, recorded))]
-
-
-def demonstrations() -> list[bytes]:
-    """Of three trials."""
-    return [written(Oracle("right").demonstrations(3).save)]
 
 
 def evaluations() -> list[bytes]:

@@ -18,7 +18,6 @@ ROOT = Path(__file__).resolve().parents[2]
 
 EXTRAS = (
     "export",
-    "minari",
     "peers",
     "ray",
     "render",
