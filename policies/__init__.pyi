@@ -19,7 +19,6 @@ from .normalizer import Normalizer as Normalizer
 from .oracle import Oracle as Oracle
 from .oracle import OracleSolution as OracleSolution
 from .oracle import OracleSolutions as OracleSolutions
-from .oracle import inverse_kinematics as inverse_kinematics
 from .planning.plans import Plan as Plan
 from .planning.plans import plan as plan
 from .planning.settings import PlanSettings as PlanSettings

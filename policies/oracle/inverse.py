@@ -5,10 +5,9 @@ from functools import cache
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from kinarm._parallel import run_rows
-from kinarm.errors import InvalidInputError, finite_array, whole_number
 from kinarm.kernels.compiling import Array
 from kinarm.kernels.records import recorded
 from kinarm.policies.oracle.aims import Aims
@@ -25,53 +24,6 @@ class Solutions(NamedTuple):
 
     configurations: Array
     owner: NDArray[np.int64]
-
-
-def inverse_kinematics(
-    simulator: Simulator,
-    start: ArrayLike,
-    goal: ArrayLike,
-    *,
-    samples: int = 1024,
-    separation: float = 0.2,
-) -> Array:
-    """Find distinct contact-free configurations at a goal within the horizon.
-
-    Evenly spread configurations and the current one are moved into the ball
-    about the goal by damped least squares within the limits.
-
-    Parameters
-    ----------
-    simulator : Simulator
-        Arm, scene and tolerance.
-    start : array_like, shape (n_joints,)
-        Current configuration; axes that are not actuated stay [rad or m].
-    goal : array_like, shape (goal_width,)
-        The goal, its position first [m].
-    samples : int
-        Configurations to begin with.
-    separation : float
-        Least difference of two solutions in some axis [rad or m].
-
-    Returns
-    -------
-    ndarray, shape (k, n_joints)
-        Solutions, that of the fewest steps first [rad or m]; k may be 0.
-    """
-    q = finite_array("start", start, (simulator.arm.n_joints,))
-    g = finite_array("goal", goal, (simulator.world.goal_width,))
-    starts, goals = simulator.world.check_scenarios(q[None], g[None])
-    horizon, tolerance = np.array([simulator.task.horizon]), np.array([simulator.task.tolerance])
-    samples = whole_number("samples", samples, 1)
-    if not separation > 0:
-        raise InvalidInputError(f"separation must be greater than 0, got {separation}")
-    found, _ = solve_within(simulator, starts, goals, horizon, tolerance, starts, samples)
-    remaining = found[np.argsort(steps_between(simulator, starts, found), kind="stable")]
-    distinct = []
-    while len(remaining):
-        distinct.append(remaining[0])
-        remaining = remaining[np.abs(remaining - remaining[0]).max(axis=1) > separation]
-    return np.array(distinct).reshape(-1, simulator.arm.n_joints)
 
 
 def solve_within(
