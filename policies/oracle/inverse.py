@@ -65,10 +65,15 @@ def solve_within(
     beginnings[:, :, moved] = np.clip(beginnings[:, :, moved], lower, upper)
     owner = np.repeat(np.arange(m), samples)
     allowed = (tolerances * (1.0 - RESERVE))[owner]
-    radius = allowed * np.tile(shares, m)
-    configurations, distances = project(
-        simulator, beginnings.reshape(-1, n_joints), owner, box, aims, radius
-    )
+    radius, configurations = allowed * np.tile(shares, m), beginnings.reshape(-1, n_joints)
+    distances, wanted = np.empty(len(owner)), (aims.position, recorded(aims.turn), aims.wanted)
+    arrays = (simulator.world.records[0], owner, *box, *wanted, radius, configurations, distances)
+
+    def project_some(first: int, last: int) -> None:
+        moving = layout(n_joints, simulator.n_actions, len(aims.turn.axes)).record()
+        damped_least_squares(first, last, moving, *arrays)
+
+    run_rows(project_some, len(owner), 4 * len(owner), simulator.threads)
     near = np.flatnonzero((distances <= allowed) & ~empty[owner])
     _, touching = simulator.world.screen(configurations[near])
     free = near[~touching]
@@ -86,45 +91,6 @@ def _beginnings(samples: int, n: int) -> tuple[Array, Array]:
     # The cube root of floats would come from other libraries on other machines.
     within = [float(context.power(Decimal(share), third)) for share in points[:, -1].tolist()]
     return points[:, :-1], np.where(np.arange(samples) % 2 == 0, 1.0, within)
-
-
-def project(
-    simulator: Simulator,
-    configurations: Array,
-    owner: NDArray[np.int64],
-    box: tuple[Array, Array],
-    aims: Aims,
-    radius: Array,
-) -> tuple[Array, Array]:
-    """Move configurations towards goals by damped least squares.
-
-    Returns where they end [rad or m], and distances from tool to goal [m], or
-    those of the tool's axes if larger. Contact is ignored.
-
-    Parameters
-    ----------
-    simulator : Simulator
-        The arm.
-    configurations : ndarray, shape (k, n_joints)
-        Where they begin [rad or m].
-    owner, radius : ndarray of int and of float, shape (k,)
-        Row of box and aims for each, and how far from the goal it may rest
-        [m].
-    box, aims : tuple of ndarray, shape (m, n_actions), and Aims
-        Lower and upper corners of their limits [rad or m], and what m goals ask
-        for.
-    """
-    ended, distances = configurations.copy(), np.empty(len(configurations))
-    wanted = (aims.position, recorded(aims.turn), aims.wanted)
-    arrays = (simulator.world.records[0], owner, *box, *wanted, radius, ended, distances)
-
-    def project_some(first: int, last: int) -> None:
-        sizes = (simulator.arm.n_joints, simulator.n_actions, len(aims.turn.axes))
-        moving = layout(*sizes).record()
-        damped_least_squares(first, last, moving, *arrays)
-
-    run_rows(project_some, len(ended), 4 * len(ended), simulator.threads)
-    return ended, distances
 
 
 def step_box(simulator: Simulator, starts: Array, steps: NDArray[np.int64]) -> tuple[Array, Array]:

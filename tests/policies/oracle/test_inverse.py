@@ -4,12 +4,12 @@ import itertools
 
 import numpy as np
 import pytest
-from proofs import aims_at
+from proofs import aims_at, projected
 
 from kinarm.arm import Arm
 from kinarm.kernels.records import recorded
 from kinarm.policies.oracle import motion_search
-from kinarm.policies.oracle.inverse import project, solve_within, step_box, steps_between
+from kinarm.policies.oracle.inverse import solve_within, step_box, steps_between
 from kinarm.policies.oracle.kernels.projection import damped_least_squares, layout
 from kinarm.policies.oracle.motion_search import MotionSearch
 from kinarm.policies.oracle.stages import Stage
@@ -151,7 +151,7 @@ class TestProject:
         owner = np.arange(100) % 10
         begun = starts.copy()
         begun[:, :n] = np.clip(begun[:, :n], lower[owner], upper[owner])
-        ended, distances = project(
+        ended, distances = projected(
             simulator, begun, owner, (lower, upper), aims_at(simulator, goals), np.full(100, 0.02)
         )
         np.testing.assert_array_equal(ended[:, n:], begun[:, n:])
@@ -173,7 +173,7 @@ class TestProject:
         box = tuple(np.tile(limit[:5], (4, 1)) for limit in (arm.lower, arm.upper))
         owner = np.arange(400) % 4
         aims = aims_at(simulator, goals)
-        _, distances = project(simulator, begun, owner, box, aims, np.full(400, 1e-4))
+        _, distances = projected(simulator, begun, owner, box, aims, np.full(400, 1e-4))
         assert (distances <= 1e-4).mean() > 0.5
 
 
@@ -195,12 +195,12 @@ class TestLanes:
 
     def test_the_company_does_not_matter(self, any_simulator, rows):
         begun, owner, box, aims, radius = rows
-        ended, distances = project(any_simulator, begun, owner, box, aims, radius)
+        ended, distances = projected(any_simulator, begun, owner, box, aims, radius)
         assert np.isfinite(ended).all()
         assert np.isfinite(distances).all()
         order = np.random.default_rng(21).permutation(90)
         for some in (*np.split(order, [1, 3, 10, 17, 25, 42]), order, np.arange(0)):
-            one, other = project(any_simulator, begun[some], owner[some], box, aims, radius[some])
+            one, other = projected(any_simulator, begun[some], owner[some], box, aims, radius[some])
             np.testing.assert_array_equal(one, ended[some])
             np.testing.assert_array_equal(other, distances[some])
 
@@ -211,7 +211,7 @@ class TestLanes:
         aimed = (aims.position, recorded(aims.turn), aims.wanted)
         arrays = (owner, *box, *aimed, radius, ended, distances)
         damped_least_squares(20, 31, moving.record(), chain, *arrays)
-        expected, away = project(any_simulator, begun, owner, box, aims, radius)
+        expected, away = projected(any_simulator, begun, owner, box, aims, radius)
         moved = np.isin(np.arange(90), np.arange(20, 31))
         np.testing.assert_array_equal(ended, np.where(moved[:, None], expected, begun))
         np.testing.assert_array_equal(distances, np.where(moved, away, -1.0))
