@@ -21,7 +21,6 @@ class Stream(StrEnum):
     PPO_LEARNER = "ppo learner"
     PPO_SCENARIOS = "ppo scenarios"
     REPLAY = "replay"
-    DEMONSTRATIONS = "demonstrations"
 
 
 def stream_generator(stream: Stream, seed: int, *numbers: int) -> np.random.Generator:

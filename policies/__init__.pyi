@@ -16,11 +16,9 @@ from .learners import train_policy as train_policy
 from .library import load_policy as load_policy
 from .library import policy_names as policy_names
 from .normalizer import Normalizer as Normalizer
-from .oracle import Demonstrations as Demonstrations
 from .oracle import Oracle as Oracle
 from .oracle import OracleSolution as OracleSolution
 from .oracle import OracleSolutions as OracleSolutions
-from .oracle import inverse_kinematics as inverse_kinematics
 from .planning.plans import Plan as Plan
 from .planning.plans import plan as plan
 from .planning.settings import PlanSettings as PlanSettings

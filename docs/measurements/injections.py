@@ -7,6 +7,7 @@ which ``docs/tables.py`` makes the table of *Run it on an arm*.
 import argparse
 import json
 from collections import Counter, deque
+from collections.abc import Callable
 from itertools import product
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -16,9 +17,10 @@ import numpy as np
 from kinarm import Plant, ReachProblem, Scene
 from kinarm.errors import InvalidInputError, RunStoppedError
 from kinarm.kernels.compiling import Array
+from kinarm.plant import PlantLike
 from kinarm.policies.running.backend import WiredArm
 from kinarm.policies.running.check import ContractCheck
-from kinarm.policies.running.fake import Distortion, FakeArm
+from kinarm.policies.running.fake import FakeArm
 from kinarm.world import World
 
 PLANT = Plant(delay=(0, 2), bandwidth=(1.6, 20.0), noise=(1e-4, 2e-3))
@@ -32,6 +34,34 @@ SEEN = 0.15
 
 PLACING = 0.03
 """How far from the pose somebody puts the arm, at most [rad or m]."""
+
+
+Distortion = Callable[[Array], Array]
+"""From joint positions to other ones, shape (n_joints,) [rad or m]."""
+
+
+class FaultyArm(FakeArm):
+    """A fake arm with errors on purpose: what becomes of its readings and commands."""
+
+    def __init__(
+        self,
+        world: World,
+        start: Array,
+        *,
+        plant: PlantLike = "ideal",
+        reads: Distortion = np.copy,
+        takes: Distortion = np.copy,
+    ) -> None:
+        super().__init__(world, start, plant=plant)
+        self.reads, self.takes = reads, takes
+
+    def read(self) -> Array:
+        """What becomes of the joint positions."""
+        return self.reads(super().read())
+
+    def command(self, positions: Array) -> None:
+        """Send the joints to what becomes of the command."""
+        super().command(self.takes(positions))
 
 
 class Injection(NamedTuple):
@@ -103,7 +133,7 @@ def measure(arm: str, count: int, clean: int, seed: int = 0) -> dict[str, Any]:
     scene = Scene(obstacles=(), ground=False)
     world = World(ReachProblem.load("both").replace(arm=arm, scene=scene))
     rng, n = np.random.default_rng(seed), world.n_actions
-    fake, tally = FakeArm(world, world.arm.home, plant=PLANT), Counter[str]()
+    fake, tally = FaultyArm(world, world.arm.home, plant=PLANT), Counter[str]()
     missed, imagined = list[str](), list[str]()
     kinds = [each for each in product(KINDS, PLACES) if "stale" not in each or "reading" in each]
     while (done := tally.total()) < count + clean:

@@ -1,7 +1,5 @@
 """The oracle: what any policy could reach at best, proven and found."""
 
-from kinarm.policies.oracle.demonstrations import Demonstrations as Demonstrations
-from kinarm.policies.oracle.inverse import inverse_kinematics as inverse_kinematics
 from kinarm.policies.oracle.oracle import ORACLE_SEMANTICS as ORACLE_SEMANTICS
 from kinarm.policies.oracle.oracle import Oracle as Oracle
 from kinarm.policies.oracle.oracle import Progress as Progress

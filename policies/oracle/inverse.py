@@ -5,10 +5,9 @@ from functools import cache
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from kinarm._parallel import run_rows
-from kinarm.errors import InvalidInputError, finite_array, whole_number
 from kinarm.kernels.compiling import Array
 from kinarm.kernels.records import recorded
 from kinarm.policies.oracle.aims import Aims
@@ -25,53 +24,6 @@ class Solutions(NamedTuple):
 
     configurations: Array
     owner: NDArray[np.int64]
-
-
-def inverse_kinematics(
-    simulator: Simulator,
-    start: ArrayLike,
-    goal: ArrayLike,
-    *,
-    samples: int = 1024,
-    separation: float = 0.2,
-) -> Array:
-    """Find distinct contact-free configurations at a goal within the horizon.
-
-    Evenly spread configurations and the current one are moved into the ball
-    about the goal by damped least squares within the limits.
-
-    Parameters
-    ----------
-    simulator : Simulator
-        Arm, scene and tolerance.
-    start : array_like, shape (n_joints,)
-        Current configuration; axes that are not actuated stay [rad or m].
-    goal : array_like, shape (goal_width,)
-        The goal, its position first [m].
-    samples : int
-        Configurations to begin with.
-    separation : float
-        Least difference of two solutions in some axis [rad or m].
-
-    Returns
-    -------
-    ndarray, shape (k, n_joints)
-        Solutions, that of the fewest steps first [rad or m]; k may be 0.
-    """
-    q = finite_array("start", start, (simulator.arm.n_joints,))
-    g = finite_array("goal", goal, (simulator.world.goal_width,))
-    starts, goals = simulator.world.check_scenarios(q[None], g[None])
-    horizon, tolerance = np.array([simulator.task.horizon]), np.array([simulator.task.tolerance])
-    samples = whole_number("samples", samples, 1)
-    if not separation > 0:
-        raise InvalidInputError(f"separation must be greater than 0, got {separation}")
-    found, _ = solve_within(simulator, starts, goals, horizon, tolerance, starts, samples)
-    remaining = found[np.argsort(steps_between(simulator, starts, found), kind="stable")]
-    distinct = []
-    while len(remaining):
-        distinct.append(remaining[0])
-        remaining = remaining[np.abs(remaining - remaining[0]).max(axis=1) > separation]
-    return np.array(distinct).reshape(-1, simulator.arm.n_joints)
 
 
 def solve_within(
@@ -113,10 +65,15 @@ def solve_within(
     beginnings[:, :, moved] = np.clip(beginnings[:, :, moved], lower, upper)
     owner = np.repeat(np.arange(m), samples)
     allowed = (tolerances * (1.0 - RESERVE))[owner]
-    radius = allowed * np.tile(shares, m)
-    configurations, distances = project(
-        simulator, beginnings.reshape(-1, n_joints), owner, box, aims, radius
-    )
+    radius, configurations = allowed * np.tile(shares, m), beginnings.reshape(-1, n_joints)
+    distances, wanted = np.empty(len(owner)), (aims.position, recorded(aims.turn), aims.wanted)
+    arrays = (simulator.world.records[0], owner, *box, *wanted, radius, configurations, distances)
+
+    def project_some(first: int, last: int) -> None:
+        moving = layout(n_joints, simulator.n_actions, len(aims.turn.axes)).record()
+        damped_least_squares(first, last, moving, *arrays)
+
+    run_rows(project_some, len(owner), 4 * len(owner), simulator.threads)
     near = np.flatnonzero((distances <= allowed) & ~empty[owner])
     _, touching = simulator.world.screen(configurations[near])
     free = near[~touching]
@@ -134,45 +91,6 @@ def _beginnings(samples: int, n: int) -> tuple[Array, Array]:
     # The cube root of floats would come from other libraries on other machines.
     within = [float(context.power(Decimal(share), third)) for share in points[:, -1].tolist()]
     return points[:, :-1], np.where(np.arange(samples) % 2 == 0, 1.0, within)
-
-
-def project(
-    simulator: Simulator,
-    configurations: Array,
-    owner: NDArray[np.int64],
-    box: tuple[Array, Array],
-    aims: Aims,
-    radius: Array,
-) -> tuple[Array, Array]:
-    """Move configurations towards goals by damped least squares.
-
-    Returns where they end [rad or m], and distances from tool to goal [m], or
-    those of the tool's axes if larger. Contact is ignored.
-
-    Parameters
-    ----------
-    simulator : Simulator
-        The arm.
-    configurations : ndarray, shape (k, n_joints)
-        Where they begin [rad or m].
-    owner, radius : ndarray of int and of float, shape (k,)
-        Row of box and aims for each, and how far from the goal it may rest
-        [m].
-    box, aims : tuple of ndarray, shape (m, n_actions), and Aims
-        Lower and upper corners of their limits [rad or m], and what m goals ask
-        for.
-    """
-    ended, distances = configurations.copy(), np.empty(len(configurations))
-    wanted = (aims.position, recorded(aims.turn), aims.wanted)
-    arrays = (simulator.world.records[0], owner, *box, *wanted, radius, ended, distances)
-
-    def project_some(first: int, last: int) -> None:
-        sizes = (simulator.arm.n_joints, simulator.n_actions, len(aims.turn.axes))
-        moving = layout(*sizes).record()
-        damped_least_squares(first, last, moving, *arrays)
-
-    run_rows(project_some, len(ended), 4 * len(ended), simulator.threads)
-    return ended, distances
 
 
 def step_box(simulator: Simulator, starts: Array, steps: NDArray[np.int64]) -> tuple[Array, Array]:

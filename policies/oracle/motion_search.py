@@ -6,13 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kinarm.kernels.compiling import Array
-from kinarm.policies.oracle.inverse import (
-    Solutions,
-    inverse_kinematics,
-    solve_within,
-    step_box,
-    steps_between,
-)
+from kinarm.policies.oracle.inverse import Solutions, solve_within, step_box, steps_between
 from kinarm.policies.oracle.stages import Stage
 from kinarm.policies.planning.motions import Motions
 from kinarm.policies.planning.paths import find_path, on_path
@@ -24,6 +18,10 @@ SAMPLES, VIAS = (8, 48, 512), 128
 
 DETOURS = 4
 """Detours planned for a trial; the shortest counts."""
+
+BEGINNINGS, SEPARATION = 1024, 0.2
+"""Configurations from which ends of detours are sought, and least difference of two in some joint
+[rad or m]."""
 
 APPROACHES = (0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5)
 """Distances beyond the smallest possible one that are tried in turn [m]."""
@@ -113,7 +111,7 @@ class MotionSearch:
             return
         motions = Motions(self._resting.world)
         for row in missed:
-            ends = inverse_kinematics(self._resting, self.starts[row], self.stage.goals[row])
+            ends = self._ends(row)
             if len(ends) == 0:
                 continue
             nearest = steps_between(self.simulator, self.starts[row], ends[0])
@@ -130,6 +128,20 @@ class MotionSearch:
                     actions = along_path(self.simulator, path, through_corners=through_corners)
                     if actions is not None:
                         self._replay(np.array([row]), actions[None])
+
+    def _ends(self, row: int) -> Array:
+        """Distinct configurations at a trial's goal without contact, the soonest reached first."""
+        start, goal = self.starts[row, None], self.stage.goals[row, None]
+        task = self.simulator.task
+        most, tolerance = np.array([task.horizon]), np.array([task.tolerance])
+        found, _ = solve_within(self._resting, start, goal, most, tolerance, start, BEGINNINGS)
+        order = steps_between(self.simulator, start, found).argsort(kind="stable")
+        remaining, distinct = found[order], []
+        while len(remaining):
+            distinct.append(remaining[0])
+            apart = np.abs(remaining - remaining[0]).max(axis=1)
+            remaining = remaining[apart > SEPARATION]
+        return np.array(distinct)
 
     def try_approach(self, rows: NDArray[np.int64], distances: Array) -> None:
         """Look for motions that end as close as possible to goals out of reach."""

@@ -29,22 +29,17 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from kinarm.errors import (
-    MOST_TRIALS,
-    InvalidInputError,
     finite_array,
     one_or_many,
-    whole_number,
 )
 from kinarm.kernels.compiling import Array
 from kinarm.plant import Plant
 from kinarm.policies.oracle.bounding import Prover
-from kinarm.policies.oracle.demonstrations import Demonstrations
 from kinarm.policies.oracle.inverse import step_box
 from kinarm.policies.oracle.motion_search import MotionSearch
 from kinarm.policies.oracle.solutions import OracleSolution, OracleSolutions
 from kinarm.policies.oracle.stages import Stage, stages_of
 from kinarm.problem import ProblemLike
-from kinarm.randomness import Stream, stream_generator
 from kinarm.simulator import Simulator
 
 ORACLE_SEMANTICS = "4"
@@ -119,45 +114,6 @@ class Oracle:
             if on_progress is not None:
                 on_progress(min(first + LOT, len(q)), len(q))
         return OracleSolutions.concatenated(parts)
-
-    def demonstrate(
-        self, starts: ArrayLike, goals: ArrayLike, *, on_progress: Progress | None = None
-    ) -> Demonstrations:
-        """Show motions that reach the goals of trials; trials without one are left out.
-
-        Parameters
-        ----------
-        starts, goals, on_progress
-            As for `solve_batch`.
-
-        Raises
-        ------
-        InvalidInputError
-            If no motion reaches its goal.
-        """
-        q, g = self._scenarios(starts, goals)
-        found = self.solve_batch(q, g, on_progress=on_progress)
-        reached = found.reachable
-        if not reached.any():
-            raise InvalidInputError("the oracle finds no motion that could be imitated")
-        shown = q[reached], g[reached], found.actions[reached]
-        return Demonstrations.replayed(self.simulator, *shown, len(found))
-
-    def demonstrations(
-        self, n: int, *, seed: int = 0, on_progress: Progress | None = None
-    ) -> Demonstrations:
-        """Draw n trials, and show motions that reach their goals; see `demonstrate`.
-
-        Parameters
-        ----------
-        n, seed : int
-            Number of trials, and their seed; evaluations draw others.
-        on_progress : callable, optional
-            As for `solve_batch`.
-        """
-        rng = stream_generator(Stream.DEMONSTRATIONS, whole_number("seed", seed, 0))
-        scenarios = self.simulator.sample(rng, whole_number("n", n, 1, MOST_TRIALS))
-        return self.demonstrate(*scenarios, on_progress=on_progress)
 
     def _scenarios(self, starts: ArrayLike, goals: ArrayLike) -> tuple[Array, Array]:
         """Starts and goals, one row a trial, if they are possible."""

@@ -6,7 +6,6 @@ Two trees grow in turns until they meet (Kuffner and LaValle 2000).
 import numpy as np
 
 from kinarm.kernels.compiling import Array
-from kinarm.policies.planning.kernels.sweeping import nearest
 from kinarm.policies.planning.motions import Motions
 
 EXTENSIONS, LONGEST_EXTENSION = 1500, 0.5
@@ -43,7 +42,7 @@ class Tree:
 
     def extend(self, motions: Motions, sample: Array, longest: float) -> int | None:
         """Grow towards a sample, as far as nothing touches; return the node there."""
-        closest = nearest(self._nodes, len(self.parents), sample, motions.speeds)
+        closest = int(motions.durations(self.nodes, sample).argmin())
         origin = self._nodes[closest]
         duration = float(motions.durations(origin, sample))
         if duration < SAME:

@@ -1,7 +1,6 @@
 """A fake arm, which obeys as a plant does."""
 
 import sys
-from collections.abc import Callable
 
 import numpy as np
 
@@ -19,9 +18,6 @@ from kinarm.world import World
 FAR = 1e3
 """Distance of what is no goal [m]."""
 
-Distortion = Callable[[Array], Array]
-"""From joint positions to other ones, shape (n_joints,) [rad or m]."""
-
 
 class FakeArm(SimulatedArm):
     """An arm that lags as a plant does, and stops before it touches something.
@@ -34,21 +30,11 @@ class FakeArm(SimulatedArm):
         Where it rests [rad or m].
     plant : Plant, str or Path
         What lies between command and joint; each period is a step of it.
-    reads, takes : callable
-        What becomes of its readings and commands: errors on purpose.
     """
 
-    def __init__(
-        self,
-        world: World,
-        start: Array,
-        *,
-        plant: PlantLike = "ideal",
-        reads: Distortion = np.copy,
-        takes: Distortion = np.copy,
-    ) -> None:
+    def __init__(self, world: World, start: Array, *, plant: PlantLike = "ideal") -> None:
         self.joint_names, self.time, self.period = world.arm.joint_names, 0.0, 0.0
-        self.start, self.reads, self.takes = np.array(start, dtype=float), reads, takes
+        self.start = np.array(start, dtype=float)
         self._problem, self._plant = world.problem, Plant.load(plant)
         self._simulators = dict[float, Simulator]()
 
@@ -74,11 +60,12 @@ class FakeArm(SimulatedArm):
     def read(self) -> Array:
         """Where sensors have the joints."""
         seen = self._episodes.sensed if len(self._episodes.sensed) else self._episodes.q
-        return self.reads(seen[0].copy())
+        positions: Array = seen[0].copy()
+        return positions
 
     def command(self, positions: Array) -> None:
         """Send the joints to positions, as fast as they can."""
-        self._told = self.takes(positions)
+        self._told = positions.copy()
 
     def advance(self) -> None:
         """Move on by a step of the plant."""

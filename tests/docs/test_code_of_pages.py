@@ -56,7 +56,6 @@ SHORTER = {
 
 NEEDS = {
     r"kinarm-train ppo|.*stable_baselines3": "stable_baselines3",
-    r".*minari": "minari",
     r".*\b(ur5|panda|xarm7|so101)\b": "trimesh",
 }
 """What commands and Python need of the extras, by what is in them."""
@@ -135,7 +134,6 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
         (tmp_path / name).write_text(text)
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("BROWSER", "true")
-    monkeypatch.setenv("MINARI_DATASETS_PATH", str(tmp_path / "minari"))
     return tmp_path
 
 

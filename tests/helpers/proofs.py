@@ -4,8 +4,10 @@ import numpy as np
 import pytest
 from simulators import changed
 
+from kinarm.kernels.records import recorded
 from kinarm.policies.oracle.aims import Aims
 from kinarm.policies.oracle.bounding import Prover
+from kinarm.policies.oracle.kernels.projection import damped_least_squares, layout
 from kinarm.reference import ReferenceSimulator
 
 
@@ -31,6 +33,16 @@ def prove_distance(simulator, starts, goals, box=None, **settings):
 def aims_at(simulator, goals):
     """What goals ask for, whatever joints that are not actuated do."""
     return Aims.of(simulator, np.zeros((len(goals), simulator.arm.n_joints)), goals, 0.0)
+
+
+def projected(simulator, begun, owner, box, aims, radius):
+    """Configurations moved towards goals by damped least squares, and their distances."""
+    ended, distances = begun.copy(), np.empty(len(begun))
+    moving = layout(begun.shape[1], box[0].shape[1], len(aims.turn.axes)).record()
+    arrays = (owner, *box, aims.position, recorded(aims.turn), aims.wanted, radius)
+    chain = simulator.world.records[0]
+    damped_least_squares(0, len(begun), moving, chain, *arrays, ended, distances)
+    return ended, distances
 
 
 def within(lower, upper, start, rng, count):

@@ -33,7 +33,6 @@ kinarm-eval --policy mine.npz --policy ars-tuned-both-seed0 --trials 20 --json
 
 EXTRAS = (
     "export",
-    "minari",
     "peers",
     "ray",
     "render",

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from kinarm.errors import PolicyFileError, RecordingFileError
-from kinarm.policies import Demonstrations, Oracle, Policy, load_checkpoint, recipe, save_checkpoint
+from kinarm.policies import Policy, load_checkpoint, recipe, save_checkpoint
 from kinarm.policies.learners import training_states
 from kinarm.recording import load_recordings, record_rollouts, save_recordings
 
@@ -24,7 +24,6 @@ def files(make_policy, simulator, tmp_path_factory):
     starts, goals = simulator.sample(np.random.default_rng(0), 1)
     rollouts = simulator.rollout(policy, starts, goals, record=True)
     save_recordings(folder / "recordings.npz", record_rollouts(simulator, rollouts, "mine"))
-    Oracle("right").demonstrations(3).save(folder / "demonstrations.npz")
     return folder
 
 
@@ -33,7 +32,6 @@ LOAD = {
     "ars": (load_checkpoint, PolicyFileError),
     "ppo": (load_checkpoint, PolicyFileError),
     "recordings": (load_recordings, RecordingFileError),
-    "demonstrations": (Demonstrations.load, RecordingFileError),
 }
 
 
@@ -47,7 +45,6 @@ LOAD = {
         ("ppo", "state.first_moment", np.zeros(49, dtype=np.float32)),
         ("ppo", "state.episodes.goal", np.zeros((4, 3))),
         ("recordings", "states_0", None),
-        ("demonstrations", "actions", None),
     ],
 )
 def test_parts_that_are_missing_or_do_not_fit(files, tmp_path, kind, entry, value):

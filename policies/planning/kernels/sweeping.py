@@ -1,4 +1,4 @@
-"""Kernels that prove straight motions of an arm free of contact, and find the shortest one."""
+"""Kernel that proves straight motions of an arm free of contact."""
 
 import math
 
@@ -99,19 +99,6 @@ def sweep(
                 return -1 - part - lane if first_contact(lane, doubt, *known) else part + lane
         part += LANES
     return parts
-
-
-@lean_kernel
-def nearest(nodes: Array, count: int, sample: Array, speeds: Array) -> int:
-    """Which of so many configurations reaches a sample soonest, each joint at its speed."""
-    found, least = 0, math.inf
-    for node in range(count):
-        duration = 0.0
-        for joint in range(speeds.shape[0]):
-            duration = max(duration, abs(nodes[node, joint] - sample[joint]) / speeds[joint])
-        if duration < least:
-            found, least = node, duration
-    return found
 
 
 @inlined

@@ -10,7 +10,7 @@ from scipy.optimize import least_squares, minimize
 
 from kinarm import BodyMotion
 from kinarm.goals import GoalSpecification
-from kinarm.policies import Demonstrations, Oracle
+from kinarm.policies import Oracle
 from kinarm.policies.oracle.inverse import solve_within, step_box, steps_between
 from kinarm.policies.oracle.stages import stages_of
 from kinarm.problem import PROBLEMS
@@ -212,15 +212,6 @@ class TestMotions:
         assert outcome.success.mean() > 0.02
         least = solutions.steps_lower_bound[rows]
         assert (outcome.steps >= least)[outcome.success].all()
-
-    def test_they_are_demonstrated(self, known, tmp_path):
-        oracle, starts, goals, solutions = known
-        shown = oracle.demonstrate(starts[:5], goals[:5])
-        shown.save(tmp_path / "shown.npz")
-        read = Demonstrations.load(tmp_path / "shown.npz")
-        assert read.problem.digest == oracle.simulator.problem.digest
-        np.testing.assert_array_equal(read.steps, solutions.steps[:5][solutions.reachable[:5]])
-        np.testing.assert_array_equal(read.goals, goals[:5][solutions.reachable[:5]])
 
     def test_they_do_not_depend_on_other_trials(self, known):
         oracle, starts, goals, solutions = known

@@ -4,14 +4,15 @@ import itertools
 
 import numpy as np
 import pytest
-from proofs import aims_at
+from proofs import aims_at, projected
 
 from kinarm.arm import Arm
-from kinarm.errors import InvalidInputError
 from kinarm.kernels.records import recorded
-from kinarm.policies import inverse_kinematics
-from kinarm.policies.oracle.inverse import project, solve_within, step_box, steps_between
+from kinarm.policies.oracle import motion_search
+from kinarm.policies.oracle.inverse import solve_within, step_box, steps_between
 from kinarm.policies.oracle.kernels.projection import damped_least_squares, layout
+from kinarm.policies.oracle.motion_search import MotionSearch
+from kinarm.policies.oracle.stages import Stage
 from kinarm.problem import PROBLEMS
 from kinarm.simulator import Simulator
 
@@ -21,21 +22,6 @@ SHIPPED = ("lrmate200ic_5l", "paper", "paper_flange")
 def tool_distances(simulator, configurations, goal):
     tools = np.array([simulator.arm.tool_position(q) for q in configurations]).reshape(-1, 3)
     return np.linalg.norm(tools - goal, axis=1)
-
-
-def assert_solutions(simulator, found, start, goal, separation=0.2):
-    """Within limits, horizon and tolerance, free, the nearest first, and apart."""
-    arm, n = simulator.arm, simulator.n_actions
-    assert found.shape[1:] == (arm.n_joints,)
-    assert ((found >= arm.lower) & (found <= arm.upper)).all()
-    np.testing.assert_array_equal(found[:, n:], np.tile(start[n:], (len(found), 1)))
-    assert (tool_distances(simulator, found, goal) <= simulator.task.tolerance).all()
-    assert not simulator.world.contact_model.in_contact(found).any()
-    steps = steps_between(simulator, start, found)
-    assert (np.diff(steps) >= 0).all()
-    assert (steps <= simulator.task.horizon + 1e-9).all()
-    for first, second in itertools.combinations(found, 2):
-        assert np.abs(first - second).max() > separation
 
 
 @pytest.fixture(scope="module")
@@ -55,112 +41,70 @@ def elbow_solutions(goal):
     return np.array([[angle - lead, bend], [angle + lead, -bend]])
 
 
-class TestSolutions:
+class TestEndsOfDetours:
+    @pytest.fixture
+    def ends(self, monkeypatch):
+        """What a search for detours from a start to a goal would end at."""
+
+        def found(simulator, start, goal):
+            asked = []
+            monkeypatch.setattr(motion_search, "find_path", lambda *given: asked.append(given[2]))
+            MotionSearch(simulator, start[None], Stage(goal[None])).try_detours(np.arange(1))
+            return asked[0] if asked else np.empty((0, len(start)))
+
+        return found
+
     @pytest.mark.parametrize("name", SHIPPED)
-    def test_are_solutions(self, simulators, name):
+    def test_are_solutions_the_soonest_first_and_apart(self, simulators, name, ends):
         simulator = simulators[name]
-        starts, goals = simulator.sample(np.random.default_rng(1), 12)
+        arm, n = simulator.arm, simulator.n_actions
         counts = []
-        for start, goal in zip(starts, goals, strict=True):
-            found = inverse_kinematics(simulator, start, goal)
-            assert_solutions(simulator, found, start, goal)
+        for start, goal in zip(*simulator.sample(np.random.default_rng(1), 12), strict=True):
+            found = ends(simulator, start, goal)
             counts.append(len(found))
+            assert ((found >= arm.lower) & (found <= arm.upper)).all()
+            np.testing.assert_array_equal(found[:, n:], np.tile(start[n:], (len(found), 1)))
+            assert (tool_distances(simulator, found, goal) <= simulator.task.tolerance).all()
+            assert not simulator.world.contact_model.in_contact(found).any()
+            steps = steps_between(simulator, start, found)
+            assert (np.diff(steps) >= 0).all()
+            assert (steps <= simulator.task.horizon + 1e-9).all()
+            for first, second in itertools.combinations(found, 2):
+                assert np.abs(first - second).max() > 0.2
         assert np.median(counts) > 10
 
-    def test_lie_throughout_the_tolerance(self, simulator):
-        starts, goals = simulator.sample(np.random.default_rng(2), 10)
-        away = [
-            tool_distances(simulator, inverse_kinematics(simulator, start, goal), goal)
-            for start, goal in zip(starts, goals, strict=True)
-        ]
-        shares = np.concatenate(away) / simulator.task.tolerance
-        assert (shares < 0.5).sum() > 3
-        assert (shares > 0.8).sum() > 30
-        assert shares.max() > 0.99
-
-    def test_both_elbows_of_a_planar_arm(self, planar):
-        rng = np.random.default_rng(3)
-        for _ in range(20):
-            angle, radius = rng.uniform(-1.8, 1.8), rng.uniform(0.35, 0.75)
-            goal = np.array([radius * np.cos(angle), radius * np.sin(angle), 0.4])
-            expected = elbow_solutions(goal)
-            assert (np.abs(expected) < 2.8).all()
-            found = inverse_kinematics(planar, np.zeros(2), goal)
-            assert len(found) == 2
-            for solution in expected:
-                assert np.abs(found - solution).max(axis=1).min() < 0.02
-
-    def test_current_configuration_comes_first_if_it_is_one(self, simulator):
-        start, _ = simulator.sample(np.random.default_rng(4), 1)
-        goal = simulator.arm.tool_position(start[0])
-        found = inverse_kinematics(simulator, start[0], goal)
-        np.testing.assert_array_equal(found[0], start[0])
-
-    @pytest.mark.parametrize(
-        "goal", [[0.0, 0.0, 5.0], [3.0, 0.0, 0.3], [0.0, -0.65, 0.1], [0.4, 0.0, -0.2]]
-    )
-    def test_none_where_there_is_none(self, simulator, goal):
-        found = inverse_kinematics(simulator, np.zeros(6), goal)
-        assert found.shape == (0, 6)
-
-    def test_horizon_limits_them(self):
+    def test_horizon_limits_them(self, ends):
         simulator = Simulator(PROBLEMS["right"].replace(horizon=6), threads=1)
-        start = np.zeros(6)
-        near = simulator.arm.tool_position([0.4, 0.1, 0.1, 0, 0.2, 0])
-        found = inverse_kinematics(simulator, start, near)
-        assert len(found) > 0
-        assert_solutions(simulator, found, start, near)
-        far = simulator.arm.tool_position([2.0, 0.1, 0.1, 0, 0.2, 0])
-        assert len(inverse_kinematics(simulator, start, far)) == 0
-
-    def test_separation_thins_them_out(self, simulator):
-        start, goal = np.zeros(6), np.array([0.1, -0.65, 0.325])
-        counts = []
-        for separation in (0.05, 0.2, 1.0):
-            found = inverse_kinematics(simulator, start, goal, separation=separation)
-            assert_solutions(simulator, found, start, goal, separation)
-            counts.append(len(found))
-        assert counts[0] > counts[1] > counts[2] > 0
-
-    def test_axis_that_is_not_actuated_stays(self, simulator):
-        start = np.array([0.1, 0.2, 0.1, 0.3, 0.2, -4.0])
-        found = inverse_kinematics(simulator, start, [0.1, 0.65, 0.325])
-        assert_solutions(simulator, found, start, [0.1, 0.65, 0.325])
-        assert len(found) > 0
-
-
-class TestRefusals:
-    @pytest.mark.parametrize(
-        ("start", "goal", "message"),
-        [
-            ([0] * 5, [0, 0, 0], "start must have shape"),
-            ([0] * 6, [0, 0, np.inf], "goal must be finite"),
-            ([0, 3, 0, 0, 0, 0], [0, 0, 0], "outside the limits"),
-        ],
-    )
-    def test_bad_trials(self, simulator, start, goal, message):
-        with pytest.raises(InvalidInputError, match=message):
-            inverse_kinematics(simulator, start, goal)
-
-    @pytest.mark.parametrize(
-        ("settings", "message"),
-        [
-            ({"separation": float("nan")}, "separation must be greater than 0, got"),
-            ({"samples": 0}, "samples must be a whole number"),
-        ],
-    )
-    def test_bad_numbers(self, simulator, settings, message):
-        with pytest.raises(InvalidInputError, match=message):
-            inverse_kinematics(simulator, np.zeros(6), [0, 0.65, 0.325], **settings)
-
-    def test_a_single_sample_is_the_start(self, simulator):
-        start = np.zeros(6)
-        goal = simulator.arm.tool_position(start) + np.array([0.02, 0, 0])
-        found = inverse_kinematics(simulator, start, goal, samples=1)
-        np.testing.assert_array_equal(found, [start])
+        near, far = (
+            simulator.arm.tool_position([first, 0.1, 0.1, 0, 0.2, 0]) for first in (0.4, 2.0)
+        )
+        assert len(ends(simulator, np.zeros(6), near)) > 0
+        assert len(ends(simulator, np.zeros(6), far)) == 0
 
 
 class TestSolveWithin:
+    def test_lies_throughout_the_tolerance(self, simulator):
+        starts, goals = simulator.sample(np.random.default_rng(2), 10)
+        steps, tolerances = np.full(10, 64), np.full(10, simulator.task.tolerance)
+        found = solve_within(simulator, starts, goals, steps, tolerances, starts, 256)
+        away = tool_distances(simulator, found.configurations, goals[found.owner])
+        shares = away / simulator.task.tolerance
+        assert (shares < 0.5).sum() > 3
+        assert (shares > 0.8).sum() > 30
+        assert 0.99 < shares.max() <= 1.0
+
+    def test_finds_both_elbows_of_a_planar_arm(self, planar):
+        rng = np.random.default_rng(3)
+        angle, radius = rng.uniform(-1.8, 1.8, 20), rng.uniform(0.35, 0.75, 20)
+        goals = np.column_stack([radius * np.cos(angle), radius * np.sin(angle), np.full(20, 0.4)])
+        starts, steps = np.zeros((20, 2)), np.full(20, 64)
+        found = solve_within(planar, starts, goals, steps, np.full(20, 1e-3), starts, 64)
+        for row, goal in enumerate(goals):
+            solutions = found.configurations[found.owner == row]
+            apart = solutions[:, None] - elbow_solutions(goal)
+            assert (np.abs(apart).max(axis=2).min(axis=0) < 0.02).all()
+            assert (np.abs(apart).max(axis=2).min(axis=1) < 0.02).all()
+
     def test_keeps_to_boxes_tolerances_and_owners(self, simulator):
         starts, goals = simulator.sample(np.random.default_rng(5), 20)
         steps, tolerances = np.arange(10, 50, 2), np.linspace(0.02, 0.2, 20)
@@ -207,7 +151,7 @@ class TestProject:
         owner = np.arange(100) % 10
         begun = starts.copy()
         begun[:, :n] = np.clip(begun[:, :n], lower[owner], upper[owner])
-        ended, distances = project(
+        ended, distances = projected(
             simulator, begun, owner, (lower, upper), aims_at(simulator, goals), np.full(100, 0.02)
         )
         np.testing.assert_array_equal(ended[:, n:], begun[:, n:])
@@ -229,7 +173,7 @@ class TestProject:
         box = tuple(np.tile(limit[:5], (4, 1)) for limit in (arm.lower, arm.upper))
         owner = np.arange(400) % 4
         aims = aims_at(simulator, goals)
-        _, distances = project(simulator, begun, owner, box, aims, np.full(400, 1e-4))
+        _, distances = projected(simulator, begun, owner, box, aims, np.full(400, 1e-4))
         assert (distances <= 1e-4).mean() > 0.5
 
 
@@ -251,12 +195,12 @@ class TestLanes:
 
     def test_the_company_does_not_matter(self, any_simulator, rows):
         begun, owner, box, aims, radius = rows
-        ended, distances = project(any_simulator, begun, owner, box, aims, radius)
+        ended, distances = projected(any_simulator, begun, owner, box, aims, radius)
         assert np.isfinite(ended).all()
         assert np.isfinite(distances).all()
         order = np.random.default_rng(21).permutation(90)
         for some in (*np.split(order, [1, 3, 10, 17, 25, 42]), order, np.arange(0)):
-            one, other = project(any_simulator, begun[some], owner[some], box, aims, radius[some])
+            one, other = projected(any_simulator, begun[some], owner[some], box, aims, radius[some])
             np.testing.assert_array_equal(one, ended[some])
             np.testing.assert_array_equal(other, distances[some])
 
@@ -267,7 +211,7 @@ class TestLanes:
         aimed = (aims.position, recorded(aims.turn), aims.wanted)
         arrays = (owner, *box, *aimed, radius, ended, distances)
         damped_least_squares(20, 31, moving.record(), chain, *arrays)
-        expected, away = project(any_simulator, begun, owner, box, aims, radius)
+        expected, away = projected(any_simulator, begun, owner, box, aims, radius)
         moved = np.isin(np.arange(90), np.arange(20, 31))
         np.testing.assert_array_equal(ended, np.where(moved[:, None], expected, begun))
         np.testing.assert_array_equal(distances, np.where(moved, away, -1.0))

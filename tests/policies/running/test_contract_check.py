@@ -5,7 +5,7 @@ import re
 import numpy as np
 import pytest
 
-from docs.measurements.injections import KINDS, measure
+from docs.measurements.injections import KINDS, FaultyArm, measure
 from kinarm.errors import InvalidInputError
 from kinarm.policies.running.backend import WiredArm
 from kinarm.policies.running.check import ContractCheck
@@ -22,7 +22,7 @@ def world():
 
 def said(world, reads=np.copy, takes=np.copy, pose=POSE):
     return ContractCheck(
-        WiredArm(FakeArm(world, pose, reads=reads, takes=takes), world), world, pose
+        WiredArm(FaultyArm(world, pose, reads=reads, takes=takes), world), world, pose
     ).run()
 
 

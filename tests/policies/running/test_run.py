@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from docs.measurements.injections import FaultyArm
 from kinarm import Plant, Simulator
 from kinarm.errors import (
     InvalidInputError,
@@ -46,7 +47,7 @@ def make(policy, simulator, trial):
     """A run on a fake arm."""
 
     def made(*, world=None, start=None, wiring=None, settings=None, **arm):
-        fake = FakeArm(simulator.world, trial[0] if start is None else start, **arm)
+        fake = FaultyArm(simulator.world, trial[0] if start is None else start, **arm)
         wired = WiredArm(fake, world or simulator.world, wiring)
         return Run(wired, policy, simulator, **(settings or {}))
 

@@ -2,10 +2,10 @@
 
 import numpy as np
 import pytest
-from proofs import aims_at, prove_distance, prove_steps, within
+from proofs import aims_at, projected, prove_distance, prove_steps, within
 from scipy.optimize import minimize
 
-from kinarm.policies.oracle.inverse import project, solve_within, step_box
+from kinarm.policies.oracle.inverse import solve_within, step_box
 
 CAPSULE_ARMS = ("lrmate200ic_5l", "paper", "paper_flange")
 
@@ -53,7 +53,7 @@ def reached_within(simulator, starts, goals, steps):
     begun = [within(box[0][i], box[1][i], starts[i], rng, 300) for i in range(n)]
     owner, radius = np.repeat(np.arange(n), 300), np.full(300 * n, simulator.task.tolerance)
     begun, aims = np.concatenate(begun), aims_at(simulator, goals)
-    _, distances = project(simulator, begun, owner, box, aims, radius)
+    _, distances = projected(simulator, begun, owner, box, aims, radius)
     return (distances.reshape(n, -1) <= simulator.task.tolerance).any(axis=1)
 
 
