@@ -23,7 +23,7 @@ from kinarm.evaluation.experiments.plan import Run
 from kinarm.evaluation.trials import trial_set
 from kinarm.policies.checkpoint import CHECKPOINT_SECONDS, rebuilt, save_checkpoint
 from kinarm.policies.learners import CurvePoint as IterationPoint
-from kinarm.policies.learners import find_learner, state_policy, training_states
+from kinarm.policies.learners import state_policy, training_states
 from kinarm.policies.policy import Policy, policy_content, policy_of_content
 
 ARCHIVE = ("study run", 1)
@@ -144,7 +144,6 @@ def train(
     threads: int = 1,
     *,
     on_point: Callable[[CurvePoint], object] | None = None,
-    logs: Path | None = None,
 ) -> TaskResult:
     """Train and evaluate; neither threads nor interruptions change the result.
 
@@ -154,16 +153,11 @@ def train(
         The training, and its number of threads.
     on_point : callable, optional
         Called with every point of the learning curve.
-    logs : Path, optional
-        Folder of logs for TensorBoard, with a folder for each seed.
     """
     run, start, checkpoint = task
-    config, learner = run.config, find_learner(run.learner)
-    options: dict[str, Any] = {"threads": threads} if "threads" in learner.options else {}
-    if logs is not None and "tensorboard" in learner.options:
-        options["tensorboard"] = logs / f"{learner.name}-seed{config.seed}"
+    config = run.config
     curve = Curve(config, run.trials, start.curve if start else CurveSoFar())
-    states = curve.timed(training_states(config, start and start.state, **options))
+    states = curve.timed(training_states(config, start and start.state, threads))
     state = next(states)
     if start is None:
         curve.update(state)

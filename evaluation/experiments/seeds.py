@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from kinarm._fields import to_plain
-from kinarm._files import absolute, check_folder, check_output
+from kinarm._files import check_folder, check_output
 from kinarm._interrupts import telling
 from kinarm._parallel import available_threads
 from kinarm.errors import InvalidInputError, PolicyFileError, WorkerError
@@ -84,7 +84,6 @@ def train_seeds(
     study = Study(experiment, folder / UNDER_WAY, missing)
     for run in missing:  # what was killed before its policy was written
         study.store.path("runs", run).unlink(missing_ok=True)
-    logs = absolute(training.tensorboard) if training.tensorboard else None
     last: dict[Run, IterationPoint] = {}
 
     def leave(run: Run, result: TaskResult) -> None:
@@ -105,7 +104,7 @@ def train_seeds(
                 say_findings(config)
                 jobs = min(jobs or available_threads(), len(missing))
                 threads = max(1, available_threads() // jobs)
-                study.run(jobs=jobs, threads=threads, logs=logs, on_trained=leave)
+                study.run(jobs=jobs, threads=threads, on_trained=leave)
         except WorkerError as error:
             raise WorkerError(what_is_left("workers ended unexpectedly")) from error
     shutil.rmtree(study.store.folder, ignore_errors=True)

@@ -104,7 +104,6 @@ class Study:
         jobs: int | None = None,
         threads: int = 1,
         executor: Executor | None = None,
-        logs: Path | None = None,
         on_trained: Callable[[Run, TaskResult], object] = lambda *_: None,
     ) -> "Study":
         """Run the missing trainings; after an interruption, the same call goes on.
@@ -119,8 +118,6 @@ class Study:
             each; neither changes results.
         executor : Executor, optional
             Where trainings run; processes of this machine by default.
-        logs : Path, optional
-            Folder of the logs for TensorBoard.
         on_trained : callable
             Called with every finished training and its result.
 
@@ -148,7 +145,7 @@ class Study:
                 Task(run, store.start(run), absolute(store.path("checkpoints", run)))
                 for run in missing
             ]
-            work, done = partial(train, threads=threads, logs=logs), list[str]()
+            work, done = partial(train, threads=threads), list[str]()
             with self._progress(len(tasks), done) as show:
                 for (run, *_), result in where.map(work, tasks):
                     store.save(run, result)

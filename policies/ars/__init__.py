@@ -143,5 +143,4 @@ LEARNER = shipped_learner(
     state=ARSState,
     begin=imported("kinarm.policies.ars.algorithm", "ARSTraining"),
     policy=imported("kinarm.policies.ars.algorithm", "trained_policy"),
-    options=("threads",),
 )

@@ -59,10 +59,6 @@ class PPOConfig(TrainingConfig):
         Weight of the critic's loss.
     max_grad_norm : float
         Largest norm of a gradient; longer ones are clipped.
-    target_kl : float, optional
-        An update ends before a minibatch for which the policy has moved by more
-        than 1.5 times this (Kullback-Leibler divergence); by default it never
-        does.
     log_std_init : float
         Initial logarithm of the standard deviation of the actions.
     final_log_std : float, optional
@@ -126,7 +122,6 @@ class PPOConfig(TrainingConfig):
     ent_coef: float = field(default=0.0, metadata=NOT_NEGATIVE)
     vf_coef: float = field(default=0.5, metadata=NOT_NEGATIVE)
     max_grad_norm: float = field(default=0.5, metadata=POSITIVE)
-    target_kl: float | None = field(default=None, metadata={**POSITIVE, **OPTIONAL})
     log_std_init: float = 0.0
     final_log_std: float | None = field(default=None, metadata=OPTIONAL)
     training_tolerance: float | None = field(default=None, metadata=POSITIVE)
@@ -149,7 +144,6 @@ class PPOConfig(TrainingConfig):
 
     DEFAULTS: ClassVar = {
         "final_log_std": "none, it is learnt",
-        "target_kl": "none",
         "training_tolerance": "the task's",
         "training_hold": "the task's",
         "training_speed": "the task's",
@@ -314,5 +308,4 @@ LEARNER = shipped_learner(
     state=PPOState,
     begin=imported("kinarm.policies.ppo.learner", "PPOTraining"),
     policy=imported("kinarm.policies.ppo.networks", "actor_policy"),
-    options=("tensorboard", "threads"),
 )

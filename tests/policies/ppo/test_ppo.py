@@ -1,12 +1,11 @@
 """PPO: returns by hand, exact resuming, the exported actor, and that it learns."""
 
-import sys
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from kinarm.errors import InvalidInputError, MissingExtraError
+from kinarm.errors import InvalidInputError
 from kinarm.policies import (
     PPOConfig,
     load_checkpoint,
@@ -304,13 +303,6 @@ def test_replays_are_explored_with_more_noise():
     assert 0.2 < wide.mean() < 0.8
     assert deviations[wide].std() == pytest.approx(np.exp(-1), rel=0.2)
     assert deviations[~wide].std() == pytest.approx(np.exp(-4), rel=0.2)
-
-
-class TestTensorBoard:
-    def test_missing_package_is_named(self, monkeypatch):
-        monkeypatch.setitem(sys.modules, "tensorboard.summary", None)
-        with pytest.raises(MissingExtraError, match="tensorboard is not installed"):
-            train_policy(TINY, tensorboard="logs")
 
 
 @pytest.mark.slow

@@ -7,7 +7,6 @@ from kinarm.errors import InvalidInputError
 from kinarm.kernels.compiling import kernel
 from kinarm.policies.ppo.kernels.layers import BLOCK, Matrix, evaluate, hyperbolic_tangent, multiply
 from kinarm.policies.ppo.kernels.update import (
-    LOSSES,
     Descent,
     Experience,
     Objective,
@@ -126,7 +125,7 @@ class Reference:
         chosen, objective = np.arange(n), OBJECTIVE._replace(share=1 / n)
         add_gradients(
             *(0, parts, networks.actor, networks.critic, experience, chosen, objective),
-            *(standardisation(chosen, experience.advantages), gradients, np.empty((parts, LOSSES))),
+            *(standardisation(chosen, experience.advantages), gradients),
         )
         return gradients
 
