@@ -22,9 +22,6 @@ from kinarm.policies.ppo.networks import ActorCritic
 PARTS = 8
 """Parts of a minibatch whose gradients are found independently."""
 
-ADAM = {"first_decay": 0.9, "second_decay": 0.999, "epsilon": 1e-5}
-"""Settings of Adam, as in Stable-Baselines3."""
-
 
 def update(
     config: PPOConfig,
@@ -59,7 +56,7 @@ def update(
     objective = Objective(config.clip_range, config.ent_coef, config.vf_coef, 1.0 / size)
     done = iteration / config.iterations
     learning_rate = scheduled(config.learning_rate, config.learning_rate_schedule, done)
-    descent = Descent(learning_rate, **ADAM, max_norm=config.max_grad_norm)
+    descent = Descent(learning_rate, config.max_grad_norm)
     steps_before = iteration * config.n_epochs * (n_steps // size)
     gradients = np.empty((PARTS, len(networks.weights)), dtype=np.float32)
     nets = (networks.actor, networks.critic)

@@ -27,6 +27,9 @@ HALF_LOG_2_PI = 0.91893853320467274178
 MOST = 80.0
 """Largest logarithm of a ratio that is finite in single precision."""
 
+FIRST_DECAY, SECOND_DECAY, EPSILON = 0.9, 0.999, 1e-5
+"""Settings of Adam, as in Stable-Baselines3."""
+
 
 class Experience(NamedTuple):
     """Experience of a rollout, one row a step.
@@ -53,12 +56,9 @@ class Objective(NamedTuple):
 
 
 class Descent(NamedTuple):
-    """Settings of Adam, and the norm to which gradients are clipped."""
+    """The step size of Adam, and the norm to which gradients are clipped."""
 
     learning_rate: float
-    first_decay: float
-    second_decay: float
-    epsilon: float
     max_norm: float
 
 
@@ -234,16 +234,13 @@ def descend(
         total += squares[lane]
     # Clip it, and move against its mean over its root mean square.
     shrink = np.float32(min(descent.max_norm / (math.sqrt(total) + 1e-6), 1.0))
-    kept, squares_kept = np.float32(descent.first_decay), np.float32(descent.second_decay)
-    taken, squares_taken = (
-        np.float32(1.0 - descent.first_decay),
-        np.float32(1.0 - descent.second_decay),
-    )
-    unbias = 1.0 - whole_power(descent.first_decay, steps)
+    kept, squares_kept = np.float32(FIRST_DECAY), np.float32(SECOND_DECAY)
+    taken, squares_taken = np.float32(1.0 - FIRST_DECAY), np.float32(1.0 - SECOND_DECAY)
+    unbias = 1.0 - whole_power(FIRST_DECAY, steps)
     stride = np.float32(descent.learning_rate / unbias)
-    unbias = 1.0 - whole_power(descent.second_decay, steps)
+    unbias = 1.0 - whole_power(SECOND_DECAY, steps)
     widen = np.float32(1.0 / math.sqrt(unbias))
-    epsilon = np.float32(descent.epsilon)
+    epsilon = np.float32(EPSILON)
     for k in range(n_weights):
         slope = whole[k] * shrink
         first = kept * first_moment[k] + taken * slope

@@ -20,9 +20,7 @@ from kinarm.policies.ppo.networks import ActorCritic, split_parameters
 N_OBSERVATIONS, N_ACTIONS = 19, 3
 ARCHES = [(7,), (12, 10), (16, 33, 64), (130,)]
 OBJECTIVE = Objective(clip_range=0.2, ent_coef=0.01, vf_coef=0.5, share=1 / 150)
-DESCENT = Descent(
-    learning_rate=0.01, first_decay=0.9, second_decay=0.999, epsilon=1e-5, max_norm=0.5
-)
+DESCENT = Descent(learning_rate=0.01, max_norm=0.5)
 
 
 @kernel
