@@ -1,13 +1,11 @@
-"""Environments and hyperparameters for Stable-Baselines3 and rl-zoo3."""
+"""Environments for Stable-Baselines3."""
 
-from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
 
 import gymnasium
 from gymnasium.envs.registration import load_env_creator
 from numpy.typing import DTypeLike
 
-from kinarm._files import shipped_files
 from kinarm.envs import ENVIRONMENTS
 from kinarm.errors import UnknownNameError, whole_number
 from kinarm.policies.learners import find_learner
@@ -94,23 +92,3 @@ def _single_environment(problem: ProblemLike, settings: dict[str, Any]) -> "Reac
     elif not name.startswith("kinarm/") or name.endswith(".toml"):
         return (ReachGoalEnv if "reward_type" in settings else ReachEnv)(problem, **settings)
     raise UnknownNameError("environment", str(problem), ENVIRONMENTS)
-
-
-def zoo_hyperparameters(algorithm: str) -> Path:
-    """File that rl-zoo3 takes as ``--conf-file``, with kinarm's environments.
-
-    Parameters
-    ----------
-    algorithm : str
-        As rl-zoo3 names it: ``"ppo"``, ``"a2c"``, ``"sac"``, ``"td3"`` or
-        ``"tqc"``.
-
-    Raises
-    ------
-    UnknownNameError
-        If no such file ships.
-    """
-    files = shipped_files("zoo", ".yml")
-    if algorithm not in files:
-        raise UnknownNameError("algorithm", algorithm, files)
-    return files[algorithm]
