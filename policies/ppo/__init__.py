@@ -15,8 +15,8 @@ from kinarm.policies.normalizer import Normalizer
 from kinarm.policies.recipes import shipped_learner
 from kinarm.problem import ReachProblem
 
-OPTIONAL_SHARE = {"must": "lie in (0, 1]", "holds": lambda value: 0 < value <= 1, **OPTIONAL}
-"""Metadata of a share that is not zero."""
+SETTLED = 0.9
+"""Share of a training after which the noise is final."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -92,8 +92,6 @@ class PPOConfig(TrainingConfig):
         policy learns to lean on its shield.
     widening : float
         Share of the training in which spread and discount change linearly.
-    settled : float
-        Share of the training after which the noise is final.
     replay_share : float
         Probability that an episode begins where an earlier one failed; see
         `kinarm.failed_scenarios`.
@@ -134,7 +132,6 @@ class PPOConfig(TrainingConfig):
     initial_penalty: float = field(default=1.0, metadata=SHARE)
     intervention_penalty: float = field(default=0.0, metadata={**NOT_NEGATIVE, **OPTIONAL})
     widening: float = field(default=0.0, metadata=SHARE)
-    settled: float = field(default=0.9, metadata=OPTIONAL_SHARE)
     replay_share: float = field(default=0.0, metadata={**SHARE, **OPTIONAL})
     replay_size: int = field(default=8192, metadata={"at_most": LARGEST_REPLAY, **OPTIONAL})
     replay_log_std: float | None = field(default=None, metadata=OPTIONAL)
@@ -207,7 +204,7 @@ class PPOConfig(TrainingConfig):
         """Logarithm of the deviation after a share of the training, if set."""
         if self.final_log_std is None:
             return None
-        settled = min(1.0, done / self.settled)
+        settled = min(1.0, done / SETTLED)
         return (1 - settled) * self.log_std_init + settled * self.final_log_std
 
     def penalty_at(self, done: float) -> float:
@@ -275,8 +272,6 @@ class PPOState(TrainingState):
         The running episodes.
     failed : FailedScenarios
         What may be replayed.
-    simulator_time : float
-        Time spent in the simulator so far [s].
     curve : tuple of CurvePoint
         One point per finished iteration.
     """
@@ -287,7 +282,6 @@ class PPOState(TrainingState):
     normalizer: Normalizer
     episodes: EpisodeStates
     failed: FailedScenarios
-    simulator_time: float = 0.0
 
     def __post_init__(self) -> None:
         vectors = (self.parameters, self.first_moment, self.second_moment)

@@ -123,5 +123,4 @@ class PPOTraining:
             episodes=arms.states(),
             failed=arms.failed,
             curve=(*state.curve, point),
-            simulator_time=state.simulator_time + arms.time,
         )
