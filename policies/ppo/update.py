@@ -1,11 +1,10 @@
 """Updates of actor and critic by Adam."""
 
 import itertools
-from typing import Any
 
 import numpy as np
 
-from kinarm._parallel import SHARED_STEPS, run_together
+from kinarm._parallel import BALANCED_STEPS, run_rows
 from kinarm.policies.config import scheduled
 from kinarm.policies.ppo import PPOConfig
 from kinarm.policies.ppo.kernels.layers import Numbers
@@ -64,24 +63,6 @@ def update(
     minibatches = itertools.chain.from_iterable(passes)
     for step, chosen in enumerate(minibatches, start=steps_before + 1):
         standard = standardisation(chosen, experience.advantages)
-        _find_gradients(threads, *nets, experience, chosen, objective, standard, gradients)
+        given = (*nets, experience, chosen, objective, standard, gradients)
+        run_rows(add_gradients, PARTS, BALANCED_STEPS, threads, *given)
         descend(*nets, *moments, gradients, descent, step)
-
-
-def _find_gradients(threads: int, *given: Any) -> None:
-    """Call ``add_gradients(part, part + 1, *given)`` for `PARTS` parts, on threads.
-
-    The calling thread works, too, and does not wait for one that has not begun: processors may be
-    busy.
-    """
-    if threads == 1:
-        add_gradients(0, PARTS, *given)
-        return
-    parts = iter(range(PARTS))  # each number goes to one thread: it holds the GIL
-
-    def work(*_: object) -> int:
-        for part in parts:
-            add_gradients(part, part + 1, *given)
-        return 0
-
-    run_together(work, SHARED_STEPS, min(threads, PARTS), lambda _: None)
