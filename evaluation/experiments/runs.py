@@ -126,15 +126,13 @@ class TaskResult(NamedTuple):
 
     Attributes
     ----------
-    content, end : bytes
-        Contents of the file of the run, and of that from which a longer one can
-        go on; empty if none can.
+    content : bytes
+        Content of the file of the run.
     clock, iterations : Clock and tuple
         How long it took, and its iterations.
     """
 
     content: bytes
-    end: bytes
     clock: Clock
     iterations: tuple[IterationPoint, ...]
 
@@ -169,11 +167,8 @@ def train(
         if place is not None and time.monotonic() - saved > CHECKPOINT_SECONDS:
             save_checkpoint(place, config, state, curve.so_far())
             saved = time.monotonic()
-    so_far, end = curve.so_far(), io.BytesIO()
-    if run.can_extend:
-        save_checkpoint(end, config, state, so_far)
-    content = _run_content(run, Start(state, so_far))
-    return TaskResult(content, end.getvalue(), so_far.clock, state.curve)
+    so_far = curve.so_far()
+    return TaskResult(_run_content(run, Start(state, so_far)), so_far.clock, state.curve)
 
 
 def _run_content(run: Run, end: Start) -> bytes:

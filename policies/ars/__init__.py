@@ -87,11 +87,6 @@ class ARSConfig(TrainingConfig):
                 f"got {self.top_directions}"
             )
 
-    @property
-    def can_extend(self) -> bool:
-        """Whether a longer training begins just as this one goes."""
-        return self.step_size_schedule == "constant"
-
     def step_size_at(self, iteration: int) -> float:
         """Learning rate of an iteration."""
         return scheduled(self.step_size, self.step_size_schedule, iteration / self.iterations)

@@ -184,12 +184,6 @@ class PPOConfig(TrainingConfig):
             reward=self.reward, tolerance=self.training_tolerance, goal=goal or None
         )
 
-    @property
-    def can_extend(self) -> bool:
-        """Whether a longer training begins just as this one goes."""
-        settled = self.widening == 0 and self.initial_penalty == 1 and self.final_log_std is None
-        return self.learning_rate_schedule == "constant" and settled
-
     def start_spread_at(self, done: float) -> float:
         """Spread of the start configurations after this share of the training."""
         return self.problem.task.start_spread * self._widened(self.initial_start_spread, 1.0, done)
