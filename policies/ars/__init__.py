@@ -92,10 +92,6 @@ class ARSConfig(TrainingConfig):
         return scheduled(self.step_size, self.step_size_schedule, iteration / self.iterations)
 
 
-_PROBE: np.random.BitGenerator = np.random.PCG64(0)
-"""Refuses invalid states of a generator."""
-
-
 @dataclass(frozen=True, kw_only=True, eq=False)
 class ARSState(TrainingState):
     """Everything that the next iteration depends on.
@@ -117,18 +113,6 @@ class ARSState(TrainingState):
     normalizer: Normalizer
     generator: dict[str, Any]
     failed: FailedScenarios
-
-    def __post_init__(self) -> None:
-        widths = {self.normalizer.mean.shape, self.normalizer.squares.shape}
-        if len(self.theta) > 1:
-            widths.add(self.theta.shape[1:])
-        if len(widths) > 1 or self.theta.ndim != 2:
-            raise InvalidInputError(
-                f"theta of shape {self.theta.shape} needs as many statistics, "
-                f"got {self.normalizer.mean.shape} and {self.normalizer.squares.shape}"
-            )
-        self.failed.check()
-        _PROBE.state = self.generator
 
 
 LEARNER = shipped_learner(

@@ -277,17 +277,6 @@ class PPOState(TrainingState):
     episodes: EpisodeStates
     failed: FailedScenarios
 
-    def __post_init__(self) -> None:
-        vectors = (self.parameters, self.first_moment, self.second_moment)
-        statistics = (self.normalizer.mean, self.normalizer.squares)
-        for arrays in (vectors, statistics):
-            if len({array.shape for array in arrays}) > 1 or arrays[0].ndim != 1:
-                shapes = ", ".join(str(array.shape) for array in arrays)
-                raise InvalidInputError(f"parts of the state have the shapes {shapes}")
-        if len({len(array) for array in self.episodes if array.size}) > 1:
-            raise InvalidInputError("parts of the episodes' states are not as many")
-        self.failed.check()
-
 
 LEARNER = shipped_learner(
     "ppo",

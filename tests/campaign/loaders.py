@@ -150,7 +150,7 @@ def _cube() -> dict[str, bytes]:
 
 LOADERS: dict[str, Loader] = {
     "policy": Loader(samples.policies, damaged_archive, _policy),
-    "checkpoint": Loader(samples.checkpoints, damaged_archive, _checkpoint),
+    "checkpoint": Loader(samples.checkpoints, damaged_bytes, _checkpoint),
     "recordings": Loader(samples.recordings, damaged_archive, load_recordings),
     "demonstrations": Loader(samples.demonstrations, damaged_archive, Demonstrations.load),
     "bounds": Loader(_bounds_samples, damaged_archive, _bounds),
