@@ -20,7 +20,6 @@ class Stream(StrEnum):
     ARS = "ars"
     PPO_LEARNER = "ppo learner"
     PPO_SCENARIOS = "ppo scenarios"
-    REPLAY = "replay"
     STUDY = "study"
     DEMONSTRATIONS = "demonstrations"
 
