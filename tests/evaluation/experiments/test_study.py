@@ -165,7 +165,7 @@ def test_each_write_fails_in_turn(small, monkeypatch, error):
         assert list(study.store.folder.rglob("*.part")) == []
         if len(calls) < failing_at:
             break
-    assert failures == len(calls) == 1 + 2 * 3  # the experiment, two trainings
+    assert failures == len(calls) == 1 + 2 * 2  # the experiment, two trainings
 
 
 class TestFailures:
