@@ -167,7 +167,7 @@ def _in_batch(actor: Actor, wrapper: Wrapper, trials: TrialSet, actions: Array) 
     from kinarm.policies import sb3_vec_env
 
     arms = sb3_vec_env(trials.problem, len(trials), seed=0)
-    arms.simulator = recorder = Recorder(trials.problem)
+    arms.env.simulator = recorder = Recorder(trials.problem)
     recorder.keep_in(actions)
     pairs = zip(trials.starts, trials.goals, strict=True)
     arms.set_options([{"start": start, "goal": goal} for start, goal in pairs])

@@ -10,8 +10,6 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from kinarm.errors import InvalidInputError
-
 StartsAndGoals = tuple[NDArray[np.float64], NDArray[np.float64]]
 """Starts, shape (n, n_joints) [rad or m], and goals, shape (n, 3) [m]."""
 
@@ -36,12 +34,6 @@ class FailedScenarios(NamedTuple):
 
     starts: NDArray[np.float64]
     goals: NDArray[np.float64]
-
-    def check(self) -> None:
-        """Refuse starts and goals of different numbers."""
-        shapes = self.starts.shape, self.goals.shape
-        if [len(shape) for shape in shapes] != [2, 2] or len(self.starts) != len(self.goals):
-            raise InvalidInputError(f"failed scenarios have the shapes {shapes[0]}, {shapes[1]}")
 
     @classmethod
     def none(cls, n_joints: int, goal_width: int = 3) -> "FailedScenarios":

@@ -20,7 +20,6 @@ class Stream(StrEnum):
     ARS = "ars"
     PPO_LEARNER = "ppo learner"
     PPO_SCENARIOS = "ppo scenarios"
-    REPLAY = "replay"
 
 
 def stream_generator(stream: Stream, seed: int, *numbers: int) -> np.random.Generator:

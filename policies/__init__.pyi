@@ -29,4 +29,3 @@ from .ppo import PPOState as PPOState
 from .provenance import Provenance as Provenance
 from .recipes import recipe as recipe
 from .sb3.environment import sb3_vec_env as sb3_vec_env
-from .sb3.environment import zoo_hyperparameters as zoo_hyperparameters

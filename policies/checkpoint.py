@@ -4,7 +4,7 @@ import json
 from collections.abc import Iterable
 from dataclasses import fields, is_dataclass
 from pathlib import Path
-from typing import IO, Any, NamedTuple, TypeVar, get_args, get_origin, get_type_hints
+from typing import Any, NamedTuple, TypeVar, get_args, get_origin, get_type_hints
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,13 +32,13 @@ class Checkpoint(NamedTuple):
 
 
 def save_checkpoint(
-    path: str | Path | IO[bytes], config: TrainingConfig, state: TrainingState, beside: Any = None
+    path: str | Path, config: TrainingConfig, state: TrainingState, beside: Any = None
 ) -> None:
     """Write the state of a training; only a complete file replaces an earlier one.
 
     Parameters
     ----------
-    path : str, Path or binary file
+    path : str or Path
         The file, ``.npz`` without pickle.
     config, state : TrainingConfig and TrainingState
         Settings and state of the training.

@@ -76,11 +76,6 @@ class TrainingConfig(Checked):
         """Name of the learner; by default ``LEARNER`` of its module."""
         return f"{type(self).__module__}:LEARNER"
 
-    @property
-    def can_extend(self) -> bool:
-        """Whether a longer training begins just as this one goes."""
-        return False
-
     def simulator(self, threads: int | None = None) -> "Simulator":
         """Build the simulator to train in."""
         from kinarm.simulator import Simulator

@@ -97,13 +97,12 @@ class Learner(Generic[ConfigT, StateT]):
     summaries : mapping of str to str
         What recipes are, in a few words, for help.
     begin : callable
-        Prepares a training, given settings and options.
+        Prepares a training, given settings and the number of threads that it
+        may take, None for all processors; results do not depend on it.
     policy : callable
         Freezes a state into a policy, given settings and state.
     adapt : callable, optional
         Adapts a recipe to the problem that it is for.
-    options : tuple of str
-        Names of the options that ``begin`` takes.
     packages, extra : tuple of str, and str
         Modules that it needs beyond kinarm's, and the extra that brings them.
     """
@@ -113,11 +112,10 @@ class Learner(Generic[ConfigT, StateT]):
     config: type[ConfigT]
     state: type[StateT]
     recipes: Mapping[str, ConfigT]
-    begin: Callable[..., Training[StateT]]
+    begin: Callable[[ConfigT, int | None], Training[StateT]]
     policy: Callable[[ConfigT, StateT], "Policy"]
     summaries: Mapping[str, str] = field(default_factory=dict)
     adapt: Callable[[ConfigT], ConfigT] = lambda config: config
-    options: tuple[str, ...] = ()
     packages: tuple[str, ...] = ()
     extra: str = ""
 
@@ -135,7 +133,7 @@ class Learner(Generic[ConfigT, StateT]):
 
 def imported(module: str, name: str) -> Callable[..., Any]:
     """A callable of a module that is imported late, since it takes long."""
-    return lambda *given, **options: getattr(import_module(module), name)(*given, **options)
+    return lambda *given: getattr(import_module(module), name)(*given)
 
 
 class TrainingResult(NamedTuple):
@@ -206,7 +204,7 @@ def train_policy(
     *,
     state: TrainingState | None = None,
     on_iteration: Callable[[Any], object] | None = None,
-    **options: Any,
+    threads: int | None = None,
 ) -> TrainingResult:
     """Train a policy.
 
@@ -218,11 +216,11 @@ def train_policy(
         Where to go on, bit for bit as without an interruption.
     on_iteration : callable, optional
         Called with the state after every iteration.
-    **options
-        What does not change the result: ``threads``, and for PPO the folder of
-        ``tensorboard`` logs.
+    threads : int, optional
+        How many it takes, by default as many as there are processors; results
+        do not depend on it.
     """
-    states = training_states(config, state, **options)
+    states = training_states(config, state, threads)
     last = next(states)
     for last in states:
         if on_iteration is not None:
@@ -231,21 +229,18 @@ def train_policy(
 
 
 def training_states(
-    config: TrainingConfig, state: TrainingState | None = None, **options: Any
+    config: TrainingConfig, state: TrainingState | None = None, threads: int | None = None
 ) -> Iterator[Any]:
     """States of a training: the given or initial one, then one per iteration.
 
     Parameters
     ----------
-    config, state, **options
+    config, state, threads
         See `train_policy`.
     """
     learner = find_learner(config.learner)
     learner.check_installed()
-    for option in options:
-        if option not in learner.options:
-            raise InvalidInputError(f"{learner.name} has no option {option!r}")
-    training = learner.begin(config, **options)
+    training = learner.begin(config, threads)
     if state is None:
         state = training.initial_state()
     yield state

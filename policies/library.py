@@ -131,22 +131,16 @@ def starting_policy(name_or_file: str, widths: Sequence[int], residual: bool = F
     either both are residual, or neither.
     """
     policy = load_policy(name_or_file)
-    found = (policy.n_observations, *(len(layer.bias) for layer in policy.layers))
-    if found != tuple(widths):
-        layers, wanted = ("-".join(map(str, each)) for each in (found, widths))
-        raise InvalidInputError(
-            f"initial_policy {name_or_file!r} has layers {layers}, the training {wanted}"
+    own = policy.n_observations, *(len(layer.bias) for layer in policy.layers)
+    usual = (*("tanh",) * (len(widths) - 2), "linear")
+    sides = (own, policy.activations, policy.residual), (tuple(widths), usual, residual)
+    if sides[0] != sides[1]:
+        found, wanted = (
+            f"{'-'.join(map(str, sizes))} ({', '.join(functions)}{'; residual' * adds})"
+            for sizes, functions, adds in sides
         )
-    if policy.residual != residual:
-        kinds = [("" if each else "not ") + "residual" for each in (policy.residual, residual)]
         raise InvalidInputError(
-            f"initial_policy {name_or_file!r} is {kinds[0]}, the training is {kinds[1]}"
-        )
-    usual = (*("tanh",) * (len(policy.layers) - 1), "linear")
-    if policy.activations != usual:
-        raise InvalidInputError(
-            f"initial_policy {name_or_file!r} has the functions {', '.join(policy.activations)}; "
-            f"those of the training are {', '.join(usual)}"
+            f"initial_policy {name_or_file!r} has layers {found}, the training {wanted}"
         )
     return policy
 

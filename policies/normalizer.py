@@ -5,8 +5,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from kinarm.errors import InvalidInputError
-
 CONSTANT_BELOW = 1e-6
 """Inputs with a smaller standard deviation are constant and get weight zero."""
 
@@ -55,10 +53,6 @@ class Normalizer:
     count: int
     mean: NDArray[np.float64]
     squares: NDArray[np.float64]
-
-    def __post_init__(self) -> None:
-        if self.count < 0 or (self.squares < 0).any():
-            raise InvalidInputError("counts and squares of observations must not be negative")
 
     @classmethod
     def empty(cls, n_observations: int) -> "Normalizer":

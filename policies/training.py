@@ -75,8 +75,6 @@ class TrainRequest(ProblemOptions):
     overwrite : bool
         Replace an earlier policy; with --resume, by that of the training that
         goes on.
-    tensorboard : Path, optional
-        Folder for TensorBoard logs.
     """
 
     learner: str
@@ -86,11 +84,10 @@ class TrainRequest(ProblemOptions):
     out: Path | str = field(metadata={"metavar": "FILE.npz"})
     resume: bool = False
     overwrite: bool = False
-    tensorboard: Path | str | None = field(default=None, metadata={"metavar": "FOLDER"})
 
     GROUPS: ClassVar = {
         "training": "recipe seed resume",
-        "output": "out overwrite tensorboard",
+        "output": "out overwrite",
         **ProblemOptions.GROUPS,
     }
     DEFAULTS: ClassVar = {
@@ -122,7 +119,6 @@ class TrainRequest(ProblemOptions):
 
     def _train(self, config: TrainingConfig, state: Any) -> TrainingResult:
         """Train from a state, None for the first, and write the files."""
-        options = {} if self.tensorboard is None else {"tensorboard": self.tensorboard}
         path, name = checkpoint_path(self.out), find_learner(config.learner).name
         title = f"{name} {config.recipe} {config.problem.name} seed {config.seed}"
 
@@ -137,7 +133,7 @@ class TrainRequest(ProblemOptions):
             line.update(words=[STARTING])
             saved = time.monotonic()
             with told_of_activities(lambda what: line.update(words=[what or STARTING])):
-                states = training_states(config, state, **options)
+                states = training_states(config, state)
                 state = next(states)
                 for state in states:
                     point = state.curve[-1]

@@ -9,7 +9,7 @@ from kinarm.arm_specification import ArmSpecification
 from kinarm.errors import MissingExtraError
 from kinarm.evaluation.experiments import search
 from kinarm.moveit import import_problem
-from kinarm.policies import Policy, PPOConfig, sb3_vec_env, train_policy
+from kinarm.policies import Policy, sb3_vec_env
 from kinarm.policies.conversion.layers import module_pieces
 from kinarm.policies.learners import find_learner
 from kinarm.policies.running.ur import URArm
@@ -23,10 +23,6 @@ NEEDED = {
         lambda: import_problem("a.yaml", "b.yaml", ArmSpecification(), Mount()),
     ),
     "torch, sb3": ("torch", lambda: next(module_pieces(None))),
-    "tensorboard, sb3": (
-        "tensorboard.summary",
-        lambda: train_policy(PPOConfig(), tensorboard="logs"),
-    ),
     "stable-baselines3, sb3": (
         "stable_baselines3.common.save_util",
         lambda: Policy.from_sb3(Path("model.zip"), "right"),

@@ -140,7 +140,7 @@ HEAVY = {"numba", "torch", "matplotlib", "pinocchio", "coal", "scipy", "meshcat"
         (
             "from kinarm.policies import PPOConfig, PPOState, load_checkpoint, train_policy",
             {"kinarm"},
-            {"torch", "stable_baselines3", "tensorboard"},
+            {"torch", "stable_baselines3"},
         ),
         (
             "import kinarm.policies.library, kinarm.policies.ars.algorithm",

@@ -49,8 +49,8 @@ class ToyState(TrainingState):
 class ToyTraining:
     """The simulator, and the episodes that every policy faces."""
 
-    def __init__(self, config: ToyConfig) -> None:
-        self.config, self.simulator = config, config.simulator()
+    def __init__(self, config: ToyConfig, threads: int | None = None) -> None:
+        self.config, self.simulator = config, config.simulator(threads)
         rng = np.random.default_rng(config.seed)
         self.starts, self.goals = self.simulator.sample(rng, config.episodes)
 

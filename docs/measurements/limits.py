@@ -133,7 +133,7 @@ def _iterations(learner: str, name: str, problem: ReachProblem) -> Callable[[], 
     few = 1 if learner == "ppo" else PROFILED_ITERATIONS
     config = recipe(learner, name, problem=problem)
     config = replace(config, iterations=max(config.iterations, 2 * few))
-    training = find_learner(learner).begin(config, **({"threads": 1} if learner == "ars" else {}))
+    training = find_learner(learner).begin(config, 1)
     state = training.iterate(training.initial_state())
 
     def run() -> None:

@@ -209,7 +209,7 @@ def compare_ars(policy: Policy, _: int) -> Iterator[Comparison]:
     """One training each of sb3-contrib's ARS and kinarm's; rates are steps in training."""
     config = recipe("ars", "tuned", problem=policy.problem)
     trials = TrialSet.draw(config.problem, TRIALS, 0)
-    training = find_learner("ars").begin(config, threads=1)
+    training = find_learner("ars").begin(config, 1)
     state = training.iterate(training.initial_state())  # compiles
 
     def iterate() -> int:

@@ -119,9 +119,8 @@ def _add_learner(
         description=f"Train a policy with {learner.title}.",
         epilog=(needs if learner.extra else "") + _epilog(name, learner),
     )
-    unused = () if "tensorboard" in learner.options else ("tensorboard",)
     recipes = {"recipe": tuple(learner.recipes)}
-    add_options(parser, TrainRequest, skip=("learner", "settings", *unused), names=recipes)
+    add_options(parser, TrainRequest, skip=("learner", "settings"), names=recipes)
     add_options(parser, SeedsRequest, skip=("training",))
     settings = parser.add_argument_group(SETTINGS.format(learner.first_recipe))
     add_options(settings, learner.config, skip=CIRCUMSTANCES, explicit=True)

@@ -66,17 +66,6 @@ class Run:
         return hash_of(self.settings)
 
     @property
-    def can_extend(self) -> bool:
-        """Whether a training with more iterations begins just like this one."""
-        return self.config.can_extend and self.trials.curve is None
-
-    @cached_property
-    def end_key(self) -> str:
-        """Hash without the iterations, which names the file to extend."""
-        config = {k: v for k, v in self.settings["config"].items() if k != "iterations"}
-        return hash_of({**self.settings, "config": config})
-
-    @property
     def name(self) -> str:
         """Its name in a line."""
         config = self.config

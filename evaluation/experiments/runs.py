@@ -23,7 +23,7 @@ from kinarm.evaluation.experiments.plan import Run
 from kinarm.evaluation.trials import trial_set
 from kinarm.policies.checkpoint import CHECKPOINT_SECONDS, rebuilt, save_checkpoint
 from kinarm.policies.learners import CurvePoint as IterationPoint
-from kinarm.policies.learners import find_learner, state_policy, training_states
+from kinarm.policies.learners import state_policy, training_states
 from kinarm.policies.policy import Policy, policy_content, policy_of_content
 
 ARCHIVE = ("study run", 1)
@@ -126,41 +126,29 @@ class TaskResult(NamedTuple):
 
     Attributes
     ----------
-    content, end : bytes
-        Contents of the file of the run, and of that from which a longer one can
-        go on; empty if none can.
+    content : bytes
+        Content of the file of the run.
     clock, iterations : Clock and tuple
         How long it took, and its iterations.
     """
 
     content: bytes
-    end: bytes
     clock: Clock
     iterations: tuple[IterationPoint, ...]
 
 
-def train(
-    task: Task,
-    threads: int = 1,
-    *,
-    logs: Path | None = None,
-) -> TaskResult:
+def train(task: Task, threads: int = 1) -> TaskResult:
     """Train and evaluate; neither threads nor interruptions change the result.
 
     Parameters
     ----------
     task, threads : Task and int
         The training, and its number of threads.
-    logs : Path, optional
-        Folder of logs for TensorBoard, with a folder for each seed.
     """
     run, start, checkpoint = task
-    config, learner = run.config, find_learner(run.learner)
-    options: dict[str, Any] = {"threads": threads} if "threads" in learner.options else {}
-    if logs is not None and "tensorboard" in learner.options:
-        options["tensorboard"] = logs / f"{learner.name}-seed{config.seed}"
+    config = run.config
     curve = Curve(config, run.trials, start.curve if start else CurveSoFar())
-    states = curve.timed(training_states(config, start and start.state, **options))
+    states = curve.timed(training_states(config, start and start.state, threads))
     state = next(states)
     if start is None:
         curve.update(state)
@@ -171,11 +159,8 @@ def train(
         if place is not None and time.monotonic() - saved > CHECKPOINT_SECONDS:
             save_checkpoint(place, config, state, curve.so_far())
             saved = time.monotonic()
-    so_far, end = curve.so_far(), io.BytesIO()
-    if run.can_extend:
-        save_checkpoint(end, config, state, so_far)
-    content = _run_content(run, Start(state, so_far))
-    return TaskResult(content, end.getvalue(), so_far.clock, state.curve)
+    so_far = curve.so_far()
+    return TaskResult(_run_content(run, Start(state, so_far)), so_far.clock, state.curve)
 
 
 def _run_content(run: Run, end: Start) -> bytes:

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from kinarm._fields import to_plain
-from kinarm._files import absolute, check_output
+from kinarm._files import check_output
 from kinarm._interrupts import telling
 from kinarm._parallel import available_threads
 from kinarm.errors import WorkerError
@@ -81,7 +81,6 @@ def train_seeds(
         study.store.path("runs", run).unlink(missing_ok=True)
     for run in study.missing:
         check_output(outs[run], overwrite=training.overwrite, suffix=".npz")
-    logs = absolute(training.tensorboard) if training.tensorboard else None
     last: dict[Run, IterationPoint] = {}
 
     def leave(run: Run, result: TaskResult) -> None:
@@ -99,7 +98,7 @@ def train_seeds(
                 say_findings(config)
                 jobs = min(jobs or available_threads(), missing)
                 threads = max(1, available_threads() // jobs)
-                study.run(jobs=jobs, threads=threads, logs=logs, on_trained=leave)
+                study.run(jobs=jobs, threads=threads, on_trained=leave)
         except WorkerError as error:
             raise WorkerError(what_is_left("workers ended unexpectedly")) from error
     return tuple(TrainedSeed(run.config.seed, out, last.get(run)) for run, out in outs.items())

@@ -23,7 +23,7 @@ from kinarm.policies.provenance import package_versions, source_commit
 SPECIFICATION = "study.toml"
 """File of the experiment in its folder."""
 
-FOLDERS = ("runs", "made", "failed", "checkpoints", "ends")
+FOLDERS = ("runs", "made", "failed", "checkpoints")
 
 
 @dataclass(frozen=True)
@@ -32,18 +32,16 @@ class Store:
 
     Every finished training is one file under the hash of its settings, ``runs/KEY.npz``; what has
     none is still to be done. How long it took, which differs between machines, is in
-    ``made/KEY.json``; why it failed, until it succeeds, in ``failed/KEY.json``; how far it is in
-    ``checkpoints/KEY.npz``; and where longer ones can go on in ``ends``. A damaged file counts as
-    missing.
+    ``made/KEY.json``; why it failed, until it succeeds, in ``failed/KEY.json``; and how far it is,
+    in ``checkpoints/KEY.npz``. A damaged file counts as missing.
     """
 
     folder: Path
 
     def path(self, kind: str, run: Run) -> Path:
         """File of a training in one of the folders."""
-        key = run.end_key if kind == "ends" else run.key
         suffix = ".json" if kind in ("made", "failed") else ".npz"
-        return self.folder / kind / f"{key}{suffix}"
+        return self.folder / kind / f"{run.key}{suffix}"
 
     @contextmanager
     def writing(self, experiment: Experiment) -> Iterator["Store"]:
@@ -78,8 +76,6 @@ class Store:
             return
         made = Made(**vars(result.clock), versions=package_versions(), commit=source_commit())
         write_text(self.path("made", run), json.dumps(to_plain(made)) + "\n")
-        if result.end:
-            write_atomically(self.path("ends", run), lambda file: file.write(result.end))
         write_atomically(self.path("runs", run), lambda file: file.write(result.content))
         failure.unlink(missing_ok=True)
         self.path("checkpoints", run).unlink(missing_ok=True)
@@ -93,16 +89,11 @@ class Store:
         return found
 
     def start(self, run: Run) -> Start | None:
-        """Where a training goes on that was interrupted or begun by a shorter one."""
-        paths, found = [self.path("checkpoints", run)], []
-        if run.can_extend:
-            paths.append(self.path("ends", run))
-        for path in paths:
-            with suppress(KinarmError):
-                state = load_checkpoint(path).state
-                if state.iteration <= run.config.iterations:
-                    found.append(Start(state, load_beside(path, CurveSoFar)))
-        return max(found, key=lambda start: start.state.iteration, default=None)
+        """Where a training goes on that was interrupted."""
+        path = self.path("checkpoints", run)
+        with suppress(KinarmError):
+            return Start(load_checkpoint(path).state, load_beside(path, CurveSoFar))
+        return None
 
     def shares(self, runs: Iterable[Run]) -> list[float]:
         """Finished shares of trainings under way, by their checkpoints."""

@@ -103,7 +103,6 @@ class Study:
         jobs: int | None = None,
         threads: int = 1,
         executor: Executor | None = None,
-        logs: Path | None = None,
         on_trained: Callable[[Run, TaskResult], object] = lambda *_: None,
     ) -> "Study":
         """Run the missing trainings; after an interruption, the same call goes on.
@@ -118,8 +117,6 @@ class Study:
             each; neither changes results.
         executor : Executor, optional
             Where trainings run; processes of this machine by default.
-        logs : Path, optional
-            Folder of the logs for TensorBoard.
         on_trained : callable
             Called with every finished training and its result.
 
@@ -136,7 +133,7 @@ class Study:
         for entry in self.experiment.all_entries:
             find_learner(entry.learner).check_installed()
         where, work = executor or LocalExecutor(jobs, threads), partial(train, threads=threads)
-        train_all = partial(self._train, where, partial(work, logs=logs), on_trained)
+        train_all = partial(self._train, where, work, on_trained)
         with self.store.writing(self.experiment):
             if self.experiment.search:
                 carry_out_search(self.experiment, self.store, jobs, train_all)

@@ -87,18 +87,9 @@ class ARSConfig(TrainingConfig):
                 f"got {self.top_directions}"
             )
 
-    @property
-    def can_extend(self) -> bool:
-        """Whether a longer training begins just as this one goes."""
-        return self.step_size_schedule == "constant"
-
     def step_size_at(self, iteration: int) -> float:
         """Learning rate of an iteration."""
         return scheduled(self.step_size, self.step_size_schedule, iteration / self.iterations)
-
-
-_PROBE: np.random.BitGenerator = np.random.PCG64(0)
-"""Refuses invalid states of a generator."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -123,18 +114,6 @@ class ARSState(TrainingState):
     generator: dict[str, Any]
     failed: FailedScenarios
 
-    def __post_init__(self) -> None:
-        widths = {self.normalizer.mean.shape, self.normalizer.squares.shape}
-        if len(self.theta) > 1:
-            widths.add(self.theta.shape[1:])
-        if len(widths) > 1 or self.theta.ndim != 2:
-            raise InvalidInputError(
-                f"theta of shape {self.theta.shape} needs as many statistics, "
-                f"got {self.normalizer.mean.shape} and {self.normalizer.squares.shape}"
-            )
-        self.failed.check()
-        _PROBE.state = self.generator
-
 
 LEARNER = shipped_learner(
     "ars",
@@ -143,5 +122,4 @@ LEARNER = shipped_learner(
     state=ARSState,
     begin=imported("kinarm.policies.ars.algorithm", "ARSTraining"),
     policy=imported("kinarm.policies.ars.algorithm", "trained_policy"),
-    options=("threads",),
 )

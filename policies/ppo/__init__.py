@@ -15,8 +15,8 @@ from kinarm.policies.normalizer import Normalizer
 from kinarm.policies.recipes import shipped_learner
 from kinarm.problem import ReachProblem
 
-OPTIONAL_SHARE = {"must": "lie in (0, 1]", "holds": lambda value: 0 < value <= 1, **OPTIONAL}
-"""Metadata of a share that is not zero."""
+SETTLED = 0.9
+"""Share of a training after which the noise is final."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -59,10 +59,6 @@ class PPOConfig(TrainingConfig):
         Weight of the critic's loss.
     max_grad_norm : float
         Largest norm of a gradient; longer ones are clipped.
-    target_kl : float, optional
-        An update ends before a minibatch for which the policy has moved by more
-        than 1.5 times this (Kullback-Leibler divergence); by default it never
-        does.
     log_std_init : float
         Initial logarithm of the standard deviation of the actions.
     final_log_std : float, optional
@@ -96,8 +92,6 @@ class PPOConfig(TrainingConfig):
         policy learns to lean on its shield.
     widening : float
         Share of the training in which spread and discount change linearly.
-    settled : float
-        Share of the training after which the noise is final.
     replay_share : float
         Probability that an episode begins where an earlier one failed; see
         `kinarm.failed_scenarios`.
@@ -126,7 +120,6 @@ class PPOConfig(TrainingConfig):
     ent_coef: float = field(default=0.0, metadata=NOT_NEGATIVE)
     vf_coef: float = field(default=0.5, metadata=NOT_NEGATIVE)
     max_grad_norm: float = field(default=0.5, metadata=POSITIVE)
-    target_kl: float | None = field(default=None, metadata={**POSITIVE, **OPTIONAL})
     log_std_init: float = 0.0
     final_log_std: float | None = field(default=None, metadata=OPTIONAL)
     training_tolerance: float | None = field(default=None, metadata=POSITIVE)
@@ -139,7 +132,6 @@ class PPOConfig(TrainingConfig):
     initial_penalty: float = field(default=1.0, metadata=SHARE)
     intervention_penalty: float = field(default=0.0, metadata={**NOT_NEGATIVE, **OPTIONAL})
     widening: float = field(default=0.0, metadata=SHARE)
-    settled: float = field(default=0.9, metadata=OPTIONAL_SHARE)
     replay_share: float = field(default=0.0, metadata={**SHARE, **OPTIONAL})
     replay_size: int = field(default=8192, metadata={"at_most": LARGEST_REPLAY, **OPTIONAL})
     replay_log_std: float | None = field(default=None, metadata=OPTIONAL)
@@ -149,7 +141,6 @@ class PPOConfig(TrainingConfig):
 
     DEFAULTS: ClassVar = {
         "final_log_std": "none, it is learnt",
-        "target_kl": "none",
         "training_tolerance": "the task's",
         "training_hold": "the task's",
         "training_speed": "the task's",
@@ -193,12 +184,6 @@ class PPOConfig(TrainingConfig):
             reward=self.reward, tolerance=self.training_tolerance, goal=goal or None
         )
 
-    @property
-    def can_extend(self) -> bool:
-        """Whether a longer training begins just as this one goes."""
-        settled = self.widening == 0 and self.initial_penalty == 1 and self.final_log_std is None
-        return self.learning_rate_schedule == "constant" and settled
-
     def start_spread_at(self, done: float) -> float:
         """Spread of the start configurations after this share of the training."""
         return self.problem.task.start_spread * self._widened(self.initial_start_spread, 1.0, done)
@@ -213,7 +198,7 @@ class PPOConfig(TrainingConfig):
         """Logarithm of the deviation after a share of the training, if set."""
         if self.final_log_std is None:
             return None
-        settled = min(1.0, done / self.settled)
+        settled = min(1.0, done / SETTLED)
         return (1 - settled) * self.log_std_init + settled * self.final_log_std
 
     def penalty_at(self, done: float) -> float:
@@ -281,8 +266,6 @@ class PPOState(TrainingState):
         The running episodes.
     failed : FailedScenarios
         What may be replayed.
-    simulator_time : float
-        Time spent in the simulator so far [s].
     curve : tuple of CurvePoint
         One point per finished iteration.
     """
@@ -293,18 +276,6 @@ class PPOState(TrainingState):
     normalizer: Normalizer
     episodes: EpisodeStates
     failed: FailedScenarios
-    simulator_time: float = 0.0
-
-    def __post_init__(self) -> None:
-        vectors = (self.parameters, self.first_moment, self.second_moment)
-        statistics = (self.normalizer.mean, self.normalizer.squares)
-        for arrays in (vectors, statistics):
-            if len({array.shape for array in arrays}) > 1 or arrays[0].ndim != 1:
-                shapes = ", ".join(str(array.shape) for array in arrays)
-                raise InvalidInputError(f"parts of the state have the shapes {shapes}")
-        if len({len(array) for array in self.episodes if array.size}) > 1:
-            raise InvalidInputError("parts of the episodes' states are not as many")
-        self.failed.check()
 
 
 LEARNER = shipped_learner(
@@ -314,5 +285,4 @@ LEARNER = shipped_learner(
     state=PPOState,
     begin=imported("kinarm.policies.ppo.learner", "PPOTraining"),
     policy=imported("kinarm.policies.ppo.networks", "actor_policy"),
-    options=("tensorboard", "threads"),
 )

@@ -1,7 +1,5 @@
 """The arms of a training, their episodes, and rollouts of the actor."""
 
-import time
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -35,8 +33,6 @@ class TrainingArms:
         Of each step since `restore`, rows of episodes that the time limit cut
         short, shape (n,), and their last observations, shape (n,
         n_observations).
-    time : float
-        Time that steps took since `restore` [s].
     """
 
     def __init__(self, config: PPOConfig) -> None:
@@ -64,7 +60,7 @@ class TrainingArms:
             *scenarios, origins=start, taken=taken, drive=begun.drive, done=kept
         )
         self._total, self._start, self.replayed = begun.total, begun.start, begun.replayed
-        self.failed, self.time = state.failed, 0.0
+        self.failed = state.failed
         self.returns: list[NDArray[np.float64]] = []
         self.successes: list[NDArray[np.bool_]] = []
         self.cut_short: list[NDArray[np.int64]] = []
@@ -100,7 +96,7 @@ class TrainingArms:
 
         Returns rewards, and which episodes ended, shape (n_envs,) each.
         """
-        began, episodes = time.perf_counter(), self.episodes
+        episodes = self.episodes
         replaced = episodes.interventions.copy()
         result = self.simulator.step(episodes, actions)
         rewards = result.reward - self._remitted * result.terms[:, COLLISION]
@@ -115,7 +111,6 @@ class TrainingArms:
             self.returns.append(self._total[counted])
             self.successes.append(result.success[counted])
             self._renew(ended.nonzero()[0], ended & ~result.success)
-        self.time += time.perf_counter() - began
         return rewards.astype(np.float32), ended
 
     def _renew(self, rows: NDArray[np.int64], missed: NDArray[np.bool_]) -> None:

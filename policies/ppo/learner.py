@@ -1,14 +1,12 @@
 """Proximal Policy Optimization, one iteration at a time (Schulman et al. 2017)."""
 
 import time
-from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from kinarm._parallel import available_threads
-from kinarm.errors import InvalidInputError, needed, whole_number
+from kinarm.errors import InvalidInputError, whole_number
 from kinarm.failed_scenarios import FailedScenarios
 from kinarm.policies.learners import CurvePoint
 from kinarm.policies.library import layer_widths, starting_policy, statistics
@@ -16,7 +14,7 @@ from kinarm.policies.normalizer import Normalizer
 from kinarm.policies.ppo import EpisodeStates, PPOConfig, PPOState
 from kinarm.policies.ppo.arms import TrainingArms, collect
 from kinarm.policies.ppo.networks import ActorCritic, initial_parameters, split_parameters
-from kinarm.policies.ppo.update import logged, update
+from kinarm.policies.ppo.update import update
 from kinarm.randomness import Stream, stream_generator
 
 NORMALIZED_OVER = 10_000
@@ -38,23 +36,17 @@ def seed_iteration(seed: int, iteration: int) -> tuple[np.random.Generator, np.r
 class PPOTraining:
     """A training under way; all that changes is in the `PPOState`.
 
-    Its logs go to the folder ``tensorboard``. Updates take as many threads as there are processors
-    by default; the result does not depend on them.
+    Updates take as many threads as there are processors by default; the result does not depend on
+    them.
     """
 
-    def __init__(
-        self, config: PPOConfig, tensorboard: str | Path | None = None, threads: int | None = None
-    ) -> None:
+    def __init__(self, config: PPOConfig, threads: int | None = None) -> None:
         self.config, self.arms = config, TrainingArms(config)
         if threads is None:
             threads = available_threads()
         self.threads = whole_number("threads", threads, 1)
         self._widths = layer_widths(config.problem, config.net_arch)
         self.networks = ActorCritic(self._widths)
-        self._writer: Any = None
-        if tensorboard is not None:
-            summary = needed("tensorboard.summary", "tensorboard", "sb3")
-            self._writer = summary.Writer(str(tensorboard))
 
     def initial_state(self) -> PPOState:
         """State before the first iteration; the normaliser has seen random starts."""
@@ -108,8 +100,7 @@ class PPOTraining:
         arms.restore(state, scenarios)
         experience = collect(networks, arms, rng, gamma=config.gamma_at(done), threads=self.threads)
         moments = networks.scattered(state.first_moment), networks.scattered(state.second_moment)
-        given = (config, state.iteration, networks, moments, experience, rng)
-        records = update(*given, self.threads)
+        update(config, state.iteration, networks, moments, experience, rng, self.threads)
         vectors = [networks.gathered(each) for each in (networks.weights, *moments)]
         if not all(np.isfinite(vector).all() for vector in vectors):
             raise InvalidInputError(
@@ -124,10 +115,6 @@ class PPOTraining:
             environment_steps=state.environment_steps + config.steps_per_iteration,
             wall_time=state.wall_time + time.perf_counter() - began,
         )
-        if self._writer is not None:
-            for name, value in logged(config, point, records, experience).items():
-                self._writer.add_scalar(name, value, point.environment_steps)
-            self._writer.flush()
         return PPOState(
             parameters=vectors[0],
             first_moment=vectors[1],
@@ -136,5 +123,4 @@ class PPOTraining:
             episodes=arms.states(),
             failed=arms.failed,
             curve=(*state.curve, point),
-            simulator_time=state.simulator_time + arms.time,
         )

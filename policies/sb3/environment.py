@@ -1,20 +1,18 @@
-"""Environments and hyperparameters for Stable-Baselines3 and rl-zoo3."""
+"""Environments for Stable-Baselines3."""
 
-from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
 
 import gymnasium
 from gymnasium.envs.registration import load_env_creator
 from numpy.typing import DTypeLike
 
-from kinarm._files import shipped_files
 from kinarm.envs import ENVIRONMENTS
 from kinarm.errors import UnknownNameError, whole_number
 from kinarm.policies.learners import find_learner
 from kinarm.problem import ProblemLike
 
 if TYPE_CHECKING:
-    from kinarm.envs import ReachEnv
+    from kinarm.envs import ReachVectorEnv
     from kinarm.policies.sb3.vec_env import SB3VecEnv
 
 
@@ -26,8 +24,6 @@ def sb3_vec_env(
     observation_dtype: DTypeLike = "float32",
     reward_type: str | None = None,
     threads: int | None = None,
-    replay_share: float = 0.0,
-    replay_size: int = 8192,
     render_mode: str | None = None,
     width: int = 480,
     height: int = 360,
@@ -51,10 +47,6 @@ def sb3_vec_env(
         goal-conditioned.
     threads : int, optional
         As for `kinarm.Simulator`.
-    replay_share, replay_size : float and int
-        Probability that an episode begins where one of the last ``replay_size``
-        failures did, told by infos (``replayed``). Evaluate policies without
-        it.
     render_mode, width, height, camera
         As for `kinarm.ReachEnv`.
     **overrides
@@ -70,47 +62,34 @@ def sb3_vec_env(
     from kinarm.policies.sb3.vec_env import SB3VecEnv
 
     whole_number("n_envs", n_envs, 1)
-    settings = {"observation_dtype": observation_dtype, **overrides}
+    settings = {
+        "observation_dtype": observation_dtype,
+        "threads": threads,
+        "render_mode": render_mode,
+        "width": width,
+        "height": height,
+        "camera": camera,
+        **overrides,
+    }
     if reward_type is not None:
         settings["reward_type"] = reward_type
-    single = _single_environment(problem, settings)
-    replay: Any = {"replay_share": replay_share, "replay_size": replay_size}
-    shown: Any = {"render_mode": render_mode, "width": width, "height": height}
-    env = SB3VecEnv(single, n_envs, threads=threads, camera=camera, **replay, **shown)
+    env = SB3VecEnv(_batch(problem, n_envs, settings))
     env.seed(None if seed is None else whole_number("seed", seed, 0))
     return env
 
 
-def _single_environment(problem: ProblemLike, settings: dict[str, Any]) -> "ReachEnv":
-    """The single environment of the batch."""
-    from kinarm.envs import ReachEnv, ReachGoalEnv
+def _batch(problem: ProblemLike, n_envs: int, settings: dict[str, Any]) -> "ReachVectorEnv":
+    """The batch of a problem or of an environment's id."""
+    from kinarm.envs import ReachGoalVectorEnv, ReachVectorEnv
 
     name = str(problem).rpartition(":")[2]
     if name in gymnasium.registry:
-        entry_point = gymnasium.spec(name).entry_point
+        entry_point = gymnasium.spec(name).vector_entry_point
         maker = load_env_creator(entry_point) if isinstance(entry_point, str) else entry_point
-        if isinstance(maker, type) and issubclass(maker, ReachEnv):
-            return cast("ReachEnv", gymnasium.make(name, **settings).unwrapped)
+        if isinstance(maker, type) and issubclass(maker, ReachVectorEnv):
+            made = gymnasium.make_vec(name, n_envs, "vector_entry_point", **settings)
+            return cast("ReachVectorEnv", made.unwrapped)
     elif not name.startswith("kinarm/") or name.endswith(".toml"):
-        return (ReachGoalEnv if "reward_type" in settings else ReachEnv)(problem, **settings)
+        kind = ReachGoalVectorEnv if "reward_type" in settings else ReachVectorEnv
+        return kind(n_envs, problem, **settings)
     raise UnknownNameError("environment", str(problem), ENVIRONMENTS)
-
-
-def zoo_hyperparameters(algorithm: str) -> Path:
-    """File that rl-zoo3 takes as ``--conf-file``, with kinarm's environments.
-
-    Parameters
-    ----------
-    algorithm : str
-        As rl-zoo3 names it: ``"ppo"``, ``"a2c"``, ``"sac"``, ``"td3"`` or
-        ``"tqc"``.
-
-    Raises
-    ------
-    UnknownNameError
-        If no such file ships.
-    """
-    files = shipped_files("zoo", ".yml")
-    if algorithm not in files:
-        raise UnknownNameError("algorithm", algorithm, files)
-    return files[algorithm]

@@ -35,8 +35,10 @@ from kinarm.policies.sb3.hindsight import HindsightReplayBuffer
 REPEATING = "repeating what was done before"
 """Told while a training repeats its beginning."""
 
-REFUSALS = (AssertionError, AttributeError, KeyError, RuntimeError, TypeError, ValueError)
-"""Errors of algorithms that refuse a setting, or diverge."""
+REFUSALS = (
+    *(AssertionError, AttributeError, ImportError, KeyError, RuntimeError, TypeError, ValueError),
+)
+"""Errors of algorithms that refuse a setting or lack a package for it, or diverge."""
 
 
 @contextmanager
@@ -97,9 +99,9 @@ class SteppedLearning:
 
 
 class SB3Training:
-    """A training under way, on one thread."""
+    """A training under way, on one thread, whatever it may take."""
 
-    def __init__(self, config: SB3Config) -> None:
+    def __init__(self, config: SB3Config, _threads: int | None = None) -> None:
         self.config = config
         self._begin()
 

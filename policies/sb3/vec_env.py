@@ -4,123 +4,75 @@ import time
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 from stable_baselines3.common.monitor import Monitor
 from stable_baselines3.common.vec_env.base_vec_env import VecEnv, VecEnvIndices, VecEnvStepReturn
 
-from kinarm.envs.environment import Lifecycle, Observations, fixed_scenario, one_by_one
-from kinarm.envs.reach import ReachEnv
-from kinarm.envs.rendering import EnvPictures
-from kinarm.episodes import SUCCESS, Episodes
-from kinarm.errors import SHARE, InvalidInputError, check_range, whole_number
-from kinarm.failed_scenarios import LARGEST_REPLAY, FailedScenarios, StartsAndGoals
-from kinarm.randomness import Stream, stream_generator
-from kinarm.scenarios import ScenarioQueues
+from kinarm.envs import ReachVectorEnv
+from kinarm.envs.environment import Observations, fixed_scenario, one_by_one
+from kinarm.episodes import Episodes
+from kinarm.errors import InvalidInputError
 from kinarm.simulator import Simulator
 
 
-class SB3VecEnv(Lifecycle, VecEnv):
-    """Arms stepped together; made by `kinarm.policies.sb3_vec_env`.
+class SB3VecEnv(VecEnv):
+    """A batch of arms for Stable-Baselines3; made by `kinarm.policies.sb3_vec_env`.
 
     An episode that ends is replaced at once.
 
     Parameters
     ----------
-    single : ReachEnv
-        The environment of one arm, with problem, observations and rewards.
-    num_envs : int
-        Number of arms.
-    replay_share, replay_size : float and int
-        As for `kinarm.policies.sb3_vec_env`.
-    threads : int, optional
-        As for `kinarm.Simulator`.
-    render_mode, **picture
-        As for `kinarm.ReachEnv`: mode, ``width``, ``height`` and ``camera``.
+    env : ReachVectorEnv
+        The batch. Its steps would find what touches in every contact, which no
+        info tells here; so they are taken part by part.
 
     Notes
     -----
     The info of an episode that ended holds what Stable-Baselines3 looks for:
     ``terminal_observation``, ``TimeLimit.truncated``, ``is_success`` and, as of ``Monitor``,
     ``episode`` (return ``r``, length ``l``, time ``t`` since the environment was made [s]); besides
-    ``collision``, ``distance`` [m], ``configuration`` [rad or m] and, with replay, ``replayed``:
-    whether it began where an earlier one had failed. That of a refused move holds ``collision``.
-    Other infos are empty, which saves time.
+    ``collision``, ``distance`` [m] and ``configuration`` [rad or m]. That of a refused move holds
+    ``collision``. Other infos are empty, which saves time.
 
-    The arms share this object and its interface, which ``get_attr`` and ``env_method`` ask.
+    The arms share the batch, which ``get_attr`` and ``env_method`` ask.
     """
 
-    def __init__(
-        self,
-        single: ReachEnv,
-        num_envs: int,
-        *,
-        replay_share: float,
-        replay_size: int,
-        threads: int | None = None,
-        render_mode: str | None = None,
-        **picture: Any,
-    ) -> None:
-        self.simulator = simulator = Simulator(single.simulator.problem, threads=threads)
-        self._pictures = EnvPictures(simulator, render_mode, num_envs, **picture)
-        self.interface, self.spec, self.render_mode = single.interface, single.spec, render_mode
-        super().__init__(num_envs, single.observation_space, single.action_space)
-        self.metadata = single.metadata
-        self._queues = ScenarioQueues(simulator.world, num_envs)
-        check_range("replay_share", float(replay_share), SHARE)
-        self._share = replay_share
-        self._size = whole_number("replay_size", replay_size, 1, LARGEST_REPLAY)
-        self._chooser = np.random.default_rng()
-        self._failed = self._restored = FailedScenarios.none(
-            simulator.arm.n_joints, simulator.world.goal_width
-        )
-        self._starts = np.empty((num_envs, simulator.arm.n_joints))
-        self._replayed = np.zeros(num_envs, dtype=bool)
-        self._returns = np.zeros(num_envs)
-        self._made = time.time()
+    def __init__(self, env: ReachVectorEnv) -> None:
+        self.env, self.spec, self.render_mode = env, env.spec, env.render_mode
+        super().__init__(env.num_envs, env.single_observation_space, env.single_action_space)
+        self.metadata = env.metadata
+        self._returns, self._made = np.zeros(self.num_envs), time.time()
 
     @property
-    def failed(self) -> FailedScenarios:
-        """Scenarios of the last failed episodes, for replay."""
-        return self._failed
+    def simulator(self) -> Simulator:
+        """The simulator of the batch."""
+        return self.env.simulator
 
-    def restore_failed(self, starts: ArrayLike, goals: ArrayLike) -> None:
-        """Replay the `failed` scenarios of an earlier environment instead.
+    @property
+    def episodes(self) -> Episodes:
+        """The episodes, one row per arm; refused before a reset and after the end."""
+        return self.env.episodes
 
-        A reset with a seed goes back to them: the same seed gives the same
-        episodes.
-
-        Parameters
-        ----------
-        starts, goals : array_like, shape (n, n_joints) and (n, goal_width)
-            Configurations [rad or m] and goals [m], oldest first; the last
-            ``replay_size`` are kept.
-        """
-        if not self._share:
-            raise InvalidInputError("failed scenarios need an environment with a replay_share")
-        checked, size = self.simulator.reset(starts, goals), self._size
-        self._failed = FailedScenarios(checked.q[-size:], checked.first_goals[-size:])
-        self._restored = self._failed
+    @property
+    def configuration(self) -> NDArray[np.float64]:
+        """A copy of the joint positions, shape (n, n_joints) [rad or m]."""
+        return self.env.configuration
 
     def reset(self) -> Observations:
         """Begin all episodes anew, with the seeds and options set before."""
-        self._check_open()
-        for row, seed in enumerate(self._seeds):
-            if seed is not None:
-                self._queues.seed(row, np.random.default_rng(seed))
-        if self._seeds[0] is not None:
-            self._chooser = stream_generator(Stream.REPLAY, self._seeds[0])
-            self._failed = self._restored
-        starts, goals = self._draw(np.arange(self.num_envs))
-        for row, options in enumerate(self._options):
-            fixed = fixed_scenario(options, self.simulator, 1)
-            starts[row] = fixed.get("start", starts[row])
-            goals[row] = fixed.get("goal", goals[row])
+        shown, _ = self.env.reset(seed=self._seeds)
+        if any(self._options):  # in the place of what was drawn
+            starts, goals = self.episodes.q.copy(), self.episodes.first_goals.copy()
+            for row, options in enumerate(self._options):
+                fixed = fixed_scenario(options, self.simulator, 1)
+                starts[row] = fixed.get("start", starts[row])
+                goals[row] = fixed.get("goal", goals[row])
+            scenarios = {"start": starts, "goal": goals}
+            shown, _ = self.env.reset(seed=self._seeds, options=scenarios)
         self._reset_seeds()
         self._reset_options()
-        self._episodes = episodes = self.simulator.reset(starts, goals)
-        self._starts[:], self._returns[:] = episodes.q, 0.0
-        self._announce(episodes, np.arange(self.num_envs))
-        return self.interface.show(episodes)
+        self._note_begun(np.arange(self.num_envs))
+        return shown
 
     def set_options(self, options: Any = None) -> None:
         """Set ``start`` and ``goal`` of the next reset.
@@ -136,25 +88,11 @@ class SB3VecEnv(Lifecycle, VecEnv):
             options = [{name: array[row] for name, array in fixed.items()} for row in rows]
         super().set_options(options)
 
-    def _draw(self, rows: NDArray[np.int64]) -> StartsAndGoals:
-        """Starts and goals of the next episodes."""
-
-        def draw_new(new: NDArray[np.int64]) -> StartsAndGoals:
-            width = self.simulator.world.goal_width
-            starts, goals = np.empty(self._starts.shape), np.empty((self.num_envs, width))
-            self._queues.put(rows[new], starts, goals)
-            return starts[rows[new]], goals[rows[new]]
-
-        scenarios, self._replayed[rows] = self._failed.mixed(
-            self._share, self._chooser, rows.size, draw_new
-        )
-        return scenarios
-
-    def _announce(self, episodes: Episodes, rows: NDArray[np.int64]) -> None:
-        """Tell pictures and infos which episodes begin."""
+    def _note_begun(self, rows: NDArray[np.int64]) -> None:
+        """Note the episodes that some arms begin."""
+        episodes, self._returns[rows] = self.episodes, 0.0
         for row, distance in zip(rows.tolist(), episodes.distance[rows].tolist(), strict=True):
             self.reset_infos[row] = {"distance": distance, "configuration": episodes.q[row].copy()}
-        self._pictures.begin(rows, episodes)
 
     def step_async(self, actions: NDArray[Any]) -> None:
         """Keep the actions, shape (num_envs, n_actions), for `step_wait`."""
@@ -162,11 +100,11 @@ class SB3VecEnv(Lifecycle, VecEnv):
 
     def step_wait(self) -> VecEnvStepReturn:
         """Move every arm for one step; ended episodes show the next one's observation."""
-        episodes = self.episodes
-        result = self.simulator.step(episodes, self._actions)
-        reward, terminated, truncated = self.interface.step_outcome(episodes, result)
-        self._returns += reward
-        self._pictures.step(episodes)
+        env, episodes = self.env, self.episodes
+        result = env.simulator.step(episodes, self._actions)
+        rewards, terminated, truncated = env.interface.step_outcome(episodes, result)
+        env._pictures.step(episodes)
+        self._returns += rewards
         infos: list[dict[str, Any]] = [{} for _ in range(self.num_envs)]
         for row in np.flatnonzero(result.collision).tolist():
             infos[row]["collision"] = True
@@ -180,9 +118,7 @@ class SB3VecEnv(Lifecycle, VecEnv):
                 "distance": episodes.distance,
                 **result.told,
             }
-            if self._share:
-                columns["replayed"] = self._replayed
-            finals = one_by_one(self.interface.show(episodes, ended), ended.size)
+            finals = one_by_one(env.interface.show(episodes, ended), ended.size)
             elapsed = round(time.time() - self._made, 6)
             for row, final in zip(ended.tolist(), finals, strict=True):
                 total, length = self._returns[row].item(), episodes.steps[row].item()
@@ -192,47 +128,30 @@ class SB3VecEnv(Lifecycle, VecEnv):
                     "configuration": episodes.q[row].copy(),
                     "episode": {"r": total, "l": length, "t": elapsed},
                 }
-            self._renew(episodes, ended)
-        observations = self.interface.show(episodes)
-        return observations, reward.astype(np.float32), dones, infos
-
-    def _renew(self, episodes: Episodes, rows: NDArray[np.int64]) -> None:
-        """Replace episodes that ended."""
-        if self._share:
-            failed = rows[episodes.status[rows] != SUCCESS]
-            scenarios = self._starts[failed], episodes.first_goals[failed]
-            self._failed = self._failed.followed_by(*scenarios, self._size)
-        self._starts[rows], episodes.goal[rows] = self._draw(rows)
-        episodes.q[rows] = self._starts[rows]
-        self.simulator.begin(episodes, rows)
-        self._returns[rows] = 0.0
-        self._announce(episodes, rows)
+            env._begin(ended)
+            self._note_begun(ended)
+        return env.interface.show(episodes), rewards.astype(np.float32), dones, infos
 
     def render(self, mode: str | None = None) -> Any:
         """Draw all arms side by side; see `kinarm.ReachVectorEnv`."""
-        _ = self.episodes  # refuses if there are none
+        shown = self.env.render()
         if self.render_mode is None or mode not in (None, self.render_mode):
             return super().render(mode)
-        shown = self._pictures.render()
         return shown and shown.tiled
 
     def get_images(self) -> list[NDArray[np.uint8] | None]:
         """One picture of each arm, shape (height, width, 3), for ``rgb_array``."""
-        if self.render_mode != "rgb_array":
-            return [None] * self.num_envs
-        _ = self.episodes  # refuses if there are none
-        return list(self._pictures.render() or ())
+        return list(self.env.render() or [None] * self.num_envs)
 
     def close(self) -> None:
         """Let go of what draws the arms; nothing works afterwards."""
-        self._pictures.close()
-        self.closed = True
+        self.env.close()
 
     def get_attr(self, attr_name: str, indices: VecEnvIndices = None) -> list[Any]:
-        """An attribute of the environment or its interface, for every arm."""
+        """An attribute of the environment or its batch, for every arm."""
         if attr_name == "configuration":  # that of each
             return list(self.configuration[list(self._get_indices(indices))])
-        owner = self if hasattr(self, attr_name) else self.interface
+        owner = self if hasattr(self, attr_name) else self.env
         return [getattr(owner, attr_name) for _ in self._get_indices(indices)]
 
     def set_attr(self, attr_name: str, value: Any, indices: VecEnvIndices = None) -> None:
@@ -256,14 +175,14 @@ class SB3VecEnv(Lifecycle, VecEnv):
         indices: VecEnvIndices = None,
         **method_kwargs: Any,
     ) -> list[Any]:
-        """The answer of a method of the interface, for every arm.
+        """The answer of a method of the batch, for every arm.
 
         Parameters
         ----------
         method_name, *method_args, indices, **method_kwargs
             As for ``VecEnv``.
         """
-        result = getattr(self.interface, method_name)(*method_args, **method_kwargs)
+        result = getattr(self.env, method_name)(*method_args, **method_kwargs)
         return [result for _ in self._get_indices(indices)]
 
     def env_is_wrapped(self, wrapper_class: type, indices: VecEnvIndices = None) -> list[bool]:

@@ -32,10 +32,3 @@ def test_a_training_that_diverges_ends_in_one_line(run, tmp_path, rate, words):
     assert words in answer.err.splitlines()[-1]
     assert "Traceback" not in answer.err
     assert not (tmp_path / "p.npz").exists()
-
-
-def test_tensorboard(run, tmp_path):
-    pytest.importorskip("tensorboard")
-    arguments = ("--iterations", 2, *TINY_OPTIONS, "--tensorboard", tmp_path / "a" / "logs")
-    assert run("kinarm-train", "ppo", *arguments, "--out", tmp_path / "p.npz").status == 0
-    assert list((tmp_path / "a" / "logs").glob("*tfevents*"))

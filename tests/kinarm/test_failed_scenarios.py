@@ -1,10 +1,8 @@
 """Which scenarios are replayed, and how often."""
 
 import numpy as np
-import pytest
 from scipy import stats
 
-from kinarm.errors import InvalidInputError
 from kinarm.failed_scenarios import FailedScenarios
 
 
@@ -55,8 +53,3 @@ def test_a_share_comes_again_each_as_often_as_it_is_kept():
     np.testing.assert_array_equal(found[~replayed], np.flatnonzero(~replayed))
     twos = int((found[replayed] == -2).sum())
     assert stats.binomtest(twos, int(replayed.sum()), 0.75).pvalue > 1e-3
-
-
-def test_shapes_have_to_agree():
-    with pytest.raises(InvalidInputError, match="failed scenarios have the shapes"):
-        FailedScenarios(np.zeros((2, 6)), np.zeros((3, 3))).check()

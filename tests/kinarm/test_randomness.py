@@ -15,7 +15,7 @@ from kinarm.randomness import Stream, low_discrepancy_points, stream_generator
 def test_a_stream_is_what_it_was():
     """Its numbers are part of what a seed means."""
     first = [stream_generator(stream, 7, 3).integers(1 << 32) for stream in Stream]
-    assert first == [482907703, 3422100537, 4029689759, 1560255718]
+    assert first == [482907703, 3422100537, 4029689759]
 
 
 @pytest.mark.parametrize("draw", ["random", "standard_normal"])

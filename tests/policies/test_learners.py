@@ -90,12 +90,3 @@ def test_its_checkpoints_resume_exactly(toy, tmp_path, stopped_after):
     assert [point[:4] for point in resumed.curve] == [point[:4] for point in whole.curve]
     assert resumed.policy.layers[0].weights.tobytes() == whole.policy.layers[0].weights.tobytes()
     assert resumed.policy.provenance == whole.policy.provenance
-
-
-def test_its_options_are_its_own(toy):
-    with pytest.raises(InvalidInputError, match="toy has no option 'threads'"):
-        train_policy(recipe("toy"), threads=2)
-
-
-def test_what_settings_say_of_a_training_if_a_learner_says_no_more():
-    assert not TrainingConfig(iterations=7).can_extend

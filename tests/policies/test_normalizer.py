@@ -5,7 +5,6 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from kinarm.errors import InvalidInputError
 from kinarm.policies.normalizer import Normalizer, input_scale
 
 
@@ -49,9 +48,3 @@ def test_constant_inputs_get_weight_zero(value):
 
 def test_scale_is_the_inverse_deviation():
     np.testing.assert_array_equal(input_scale(np.array([2.0, 0.5, 0.0, 1e-7])), [0.5, 2, 0, 0])
-
-
-@pytest.mark.parametrize(("count", "squares"), [(-1, [0.0, 0.0]), (3, [0.0, -1e-9])])
-def test_what_no_observations_have_is_refused(count, squares):
-    with pytest.raises(InvalidInputError, match="must not be negative"):
-        Normalizer(count, np.zeros(2), np.array(squares))

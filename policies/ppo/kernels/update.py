@@ -27,8 +27,8 @@ HALF_LOG_2_PI = 0.91893853320467274178
 MOST = 80.0
 """Largest logarithm of a ratio that is finite in single precision."""
 
-LOSSES = 4
-"""Logged sums: policy loss, value loss, clipped ratios, divergence."""
+FIRST_DECAY, SECOND_DECAY, EPSILON = 0.9, 0.999, 1e-5
+"""Settings of Adam, as in Stable-Baselines3."""
 
 
 class Experience(NamedTuple):
@@ -56,12 +56,9 @@ class Objective(NamedTuple):
 
 
 class Descent(NamedTuple):
-    """Settings of Adam, and the norm to which gradients are clipped."""
+    """The step size of Adam, and the norm to which gradients are clipped."""
 
     learning_rate: float
-    first_decay: float
-    second_decay: float
-    epsilon: float
     max_norm: float
 
 
@@ -129,7 +126,6 @@ def add_gradients(
     objective: Objective,
     standard: tuple[float, float],
     gradients: Numbers,
-    losses: NDArray[np.float64],
 ) -> None:
     """Find the gradient of the loss of a minibatch, in fixed parts.
 
@@ -144,8 +140,8 @@ def add_gradients(
         Rows of the minibatch.
     standard : tuple of float
         Subtrahend and factor of the advantages.
-    gradients, losses : ndarray, shape (n_parts, n_weights) and (n_parts, LOSSES)
-        Filled with derivatives by the weights, and logged sums.
+    gradients : ndarray of float32, shape (n_parts, n_weights)
+        Filled with derivatives by the weights.
     """
     n_parts, n_weights = gradients.shape
     n_actions = experience.actions.shape[1]
@@ -159,9 +155,8 @@ def add_gradients(
     value_sink = critic.layers[critic.layers.shape[0] - 1, OUTPUTS]
     lowest, highest = 1.0 - objective.clip_range, 1.0 + objective.clip_range
     for part in range(first, last):
-        gradient, loss = gradients[part], losses[part]
+        gradient = gradients[part]
         gradient[:] = np.float32(0.0)
-        loss[:] = 0.0
         begin, end = part * len(chosen) // n_parts, (part + 1) * len(chosen) // n_parts
         for start in range(begin, end, BLOCK):
             rows = chosen[start : min(start + BLOCK, end)]
@@ -181,9 +176,6 @@ def add_gradients(
                 advantage = (experience.advantages[i] - standard[0]) * standard[1]
                 surrogate = advantage * ratio
                 limited = advantage * min(max(ratio, lowest), highest)
-                loss[0] -= min(surrogate, limited)
-                loss[2] += abs(ratio - 1.0) > objective.clip_range
-                loss[3] += (ratio - 1.0) - difference
                 slope = -surrogate * objective.share if surrogate <= limited else 0.0
                 for j in range(n_actions):
                     deviation = (float(experience.actions[i, j]) - work[row + j]) / scale
@@ -196,7 +188,6 @@ def add_gradients(
             for s in range(samples):
                 row = value_sink + s * padded(1)
                 error = float(work[row]) - experience.returns[rows[s]]
-                loss[1] += error * error
                 work[row] = objective.vf_coef * 2.0 * error * objective.share
             backward(critic, tiled, samples, work, behind, gradient)
         # Every part has its share of the entropy.
@@ -243,16 +234,13 @@ def descend(
         total += squares[lane]
     # Clip it, and move against its mean over its root mean square.
     shrink = np.float32(min(descent.max_norm / (math.sqrt(total) + 1e-6), 1.0))
-    kept, squares_kept = np.float32(descent.first_decay), np.float32(descent.second_decay)
-    taken, squares_taken = (
-        np.float32(1.0 - descent.first_decay),
-        np.float32(1.0 - descent.second_decay),
-    )
-    unbias = 1.0 - whole_power(descent.first_decay, steps)
+    kept, squares_kept = np.float32(FIRST_DECAY), np.float32(SECOND_DECAY)
+    taken, squares_taken = np.float32(1.0 - FIRST_DECAY), np.float32(1.0 - SECOND_DECAY)
+    unbias = 1.0 - whole_power(FIRST_DECAY, steps)
     stride = np.float32(descent.learning_rate / unbias)
-    unbias = 1.0 - whole_power(descent.second_decay, steps)
+    unbias = 1.0 - whole_power(SECOND_DECAY, steps)
     widen = np.float32(1.0 / math.sqrt(unbias))
-    epsilon = np.float32(descent.epsilon)
+    epsilon = np.float32(EPSILON)
     for k in range(n_weights):
         slope = whole[k] * shrink
         first = kept * first_moment[k] + taken * slope

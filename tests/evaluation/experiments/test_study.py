@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from small_studies import SMALL, Counting, contents
+from small_studies import Counting, contents
 
 from kinarm.errors import InvalidInputError, OutputError, TrainingFailedError
 from kinarm.evaluation import evaluate, oracle_bounds
@@ -100,39 +100,6 @@ class TestGoingOn:
         study.run(executor=executor)
         assert len(executor.tasks) == 3 * 3 - 4
         assert len(study) == 9
-
-    def test_more_iterations_go_on_where_the_shorter_training_ended(self, small):
-        small().run(jobs=1)
-        fixed = {**SMALL["fixed"], "iterations": 8}
-        executor = Counting()
-        study = small(fixed=fixed).run(executor=executor)
-        assert [task.start.state.iteration for task in executor.tasks] == [3] * 4
-        straight = small("straight", fixed=fixed).run(jobs=1)
-        for run in study.runs:
-            went_on, at_once = (
-                each.store.path("runs", run).read_bytes() for each in (study, straight)
-            )
-            assert went_on == at_once
-            times = study.store.made(run)
-            assert len(times.points) == len(study.finished[run].curve)
-
-    def test_but_not_if_the_schedule_depends_on_them(self, small):
-        changes = {"step_size_schedule": "linear"}
-        small(fixed={**SMALL["fixed"], **changes}).run(jobs=1)
-        executor = Counting()
-        small(fixed={**SMALL["fixed"], **changes, "iterations": 5}).run(executor=executor)
-        assert [task.start for task in executor.tasks] == [None] * 4
-
-    def test_a_longer_training_of_ppo(self, small):
-        fixed = {"n_envs": 2, "n_steps": 32, "batch_size": 32, "n_epochs": 2}
-        changes = {"learners": "ppo", "seeds": 1, "grid": {}}
-        small(fixed={**fixed, "iterations": 2}, **changes).run(jobs=1)
-        executor = Counting()
-        long = {"fixed": {**fixed, "iterations": 5}, **changes}
-        study = small(**long).run(executor=executor)
-        assert [task.start.state.iteration for task in executor.tasks] == [2]
-        straight = small("straight", **long).run(jobs=1)
-        assert contents(straight.store.folder).items() <= contents(study.store.folder).items()
 
     def test_an_interrupted_training_goes_on_where_it_was(self, small, monkeypatch):
         monkeypatch.setattr(training, "CHECKPOINT_SECONDS", 0.0)

@@ -17,7 +17,7 @@ from kinarm.policies import PPOConfig, recipe, sb3_vec_env
 from kinarm.policies.ppo.arms import collect, estimate_advantages
 from kinarm.policies.ppo.learner import PPOTraining
 from kinarm.policies.ppo.networks import initial_parameters, orthogonal, split_parameters
-from kinarm.policies.ppo.update import logged, update
+from kinarm.policies.ppo.update import update
 from kinarm.problem import PROBLEMS
 from kinarm.task import RewardWeights
 
@@ -135,7 +135,7 @@ def test_advantages(config):
 
 
 def test_update(config, begun, monkeypatch):
-    """Parameters, moments and logs, with the same minibatches in both."""
+    """Parameters and moments, with the same minibatches in both."""
     training, state, experience = begun
     model = twin(config, state)
     buffer = model.rollout_buffer
@@ -156,7 +156,7 @@ def test_update(config, begun, monkeypatch):
     moments = [networks.scattered(m) for m in (state.first_moment, state.second_moment)]
     constant = replace(config, learning_rate_schedule="constant")
     given = (constant, state.iteration, networks, moments, experience, rng)
-    records = update(*given, threads=1)
+    update(*given, threads=1)
     parameters = list(model.policy.parameters())
     optimizer = [model.policy.optimizer.state[parameter] for parameter in parameters]
     theirs = (
@@ -167,14 +167,6 @@ def test_update(config, begun, monkeypatch):
         expected = torch.cat([part.flatten() for part in parts]).numpy()
         np.testing.assert_allclose(networks.gathered(ours), expected, rtol=0, atol=1e-5)
     assert np.abs(networks.gathered(networks.weights) - state.parameters).max() > 1e-3
-    assert {float(each["step"]) for each in optimizer} == {
-        steps_before(config, state) + len(records.log_std)
-    }
-    entries, expected = logged(config, state.curve[-1], records, experience), model.logger
-    for name, value in entries.items():
-        if name.startswith("train/"):
-            wanted = pytest.approx(expected.name_to_value[name], rel=1e-3, abs=1e-5)
-            assert value == wanted, name
 
 
 class TestParameters:

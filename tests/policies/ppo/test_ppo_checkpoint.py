@@ -38,7 +38,6 @@ def state():
             CurvePoint(float("nan"), float("nan"), float("nan"), 12, 0.5),
             CurvePoint(0.25, 0.5, 0.125, 24, 0.75),
         ),
-        simulator_time=0.0625,
     )
 
 
@@ -63,4 +62,3 @@ def test_round_trip(saved, state):
     assert loaded.normalizer.squares.tobytes() == state.normalizer.squares.tobytes()
     np.testing.assert_array_equal(loaded.curve, state.curve)
     assert (loaded.iteration, loaded.environment_steps, loaded.wall_time) == (2, 24, 0.75)
-    assert loaded.simulator_time == 0.0625

@@ -7,7 +7,6 @@ from kinarm.errors import InvalidInputError
 from kinarm.kernels.compiling import kernel
 from kinarm.policies.ppo.kernels.layers import BLOCK, Matrix, evaluate, hyperbolic_tangent, multiply
 from kinarm.policies.ppo.kernels.update import (
-    LOSSES,
     Descent,
     Experience,
     Objective,
@@ -21,9 +20,7 @@ from kinarm.policies.ppo.networks import ActorCritic, split_parameters
 N_OBSERVATIONS, N_ACTIONS = 19, 3
 ARCHES = [(7,), (12, 10), (16, 33, 64), (130,)]
 OBJECTIVE = Objective(clip_range=0.2, ent_coef=0.01, vf_coef=0.5, share=1 / 150)
-DESCENT = Descent(
-    learning_rate=0.01, first_decay=0.9, second_decay=0.999, epsilon=1e-5, max_norm=0.5
-)
+DESCENT = Descent(learning_rate=0.01, max_norm=0.5)
 
 
 @kernel
@@ -126,7 +123,7 @@ class Reference:
         chosen, objective = np.arange(n), OBJECTIVE._replace(share=1 / n)
         add_gradients(
             *(0, parts, networks.actor, networks.critic, experience, chosen, objective),
-            *(standardisation(chosen, experience.advantages), gradients, np.empty((parts, LOSSES))),
+            *(standardisation(chosen, experience.advantages), gradients),
         )
         return gradients
 

@@ -53,7 +53,6 @@ def test_unknown_environment(env_id):
         ({"seed": -1}, "seed must be a whole number of at least 0"),
         ({"reward_type": "rare"}, "reward_type must be one of"),
         ({"speed": 2}, "speed"),
-        ({"replay_share": 1.5}, r"share must lie in \[0, 1\], got 1.5"),
         ({"problem": "up"}, "unknown problem 'up'"),
     ],
 )

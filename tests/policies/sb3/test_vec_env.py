@@ -8,7 +8,7 @@ from gymnasium.utils.env_checker import data_equivalence
 pytest.importorskip("stable_baselines3")
 
 from stable_baselines3.common.monitor import Monitor
-from stable_baselines3.common.vec_env import DummyVecEnv, VecFrameStack
+from stable_baselines3.common.vec_env import DummyVecEnv
 
 from kinarm.errors import InvalidInputError
 from kinarm.policies import sb3_vec_env
@@ -110,7 +110,7 @@ class TestAttributes:
         env = sb3_vec_env(GOALS, NUMBER)
         assert env.get_attr("render_mode") == [None] * NUMBER
         assert env.get_attr("simulator", indices=[0, 3]) == [env.simulator] * 2
-        assert env.get_attr("tells_terms", indices=2) == [False]
+        assert env.get_attr("reward_type", indices=2) == ["sparse"]
         assert env.get_attr("spec")[0].id == GOALS
         assert env.get_attr("metadata")[0]["render_fps"] == 50
 
@@ -138,57 +138,3 @@ class TestPictures:
         assert (picture.shape, picture.dtype) == ((96, 128, 3), np.uint8)
         np.testing.assert_array_equal(picture[:48, 64:], images[1])
         assert len(np.unique(np.array(images), axis=0)) == 3
-
-
-class TestReplay:
-    """Episodes that begin where earlier ones ended without success, if that is asked for."""
-
-    def play(self, env, steps=120):
-        """Goals and infos of the episodes that end."""
-        rng, ended = np.random.default_rng(1), []
-        env.reset()
-        for _ in range(steps):
-            goals = env.episodes.goal.copy()
-            infos = env.step(rng.uniform(-1, 1, (env.num_envs, 5)))[3]
-            ended += [(tuple(goals[k]), info) for k, info in enumerate(infos) if "episode" in info]
-        return ended
-
-    @pytest.mark.parametrize("env_id", [FLAT, GOALS])
-    def test_a_share_is_replayed_and_infos_say_so(self, env_id):
-        env = sb3_vec_env(env_id, 20, seed=3, replay_share=0.5, horizon=12, tolerance=0.3)
-        failed, replays = set(), []
-        for goal, info in self.play(env):
-            assert info["replayed"] == (goal in failed)
-            replays.append(info["replayed"])
-            if not info["is_success"]:
-                failed.add(goal)
-        assert 0.3 < np.mean(replays) < 0.6
-
-    def test_what_failed_goes_on_elsewhere(self, tmp_path):
-        """Saved by NumPy, given back through a wrapper, before or after a learner's seed."""
-        env = sb3_vec_env(FLAT, 10, seed=4, replay_share=0.5)
-        ended = self.play(env, 80)
-        failed = [goal for goal, info in ended if not info["is_success"]]
-        np.testing.assert_array_equal(env.failed.goals, failed)
-        np.savez(tmp_path / "failed.npz", **env.failed._asdict())
-        env.seed(7)
-        env.restore_failed(*env.failed)
-        wanted = self.play(env, 80)
-        assert any(info["replayed"] for _, info in wanted[:10])
-        for later in (False, True):
-            other = sb3_vec_env(FLAT, 10, seed=None if later else 7, replay_share=0.5)
-            with np.load(tmp_path / "failed.npz") as saved:
-                VecFrameStack(other, 2).restore_failed(**saved)
-            if later:
-                other.seed(7)
-            assert [goal for goal, _ in self.play(other, 80)] == [goal for goal, _ in wanted]
-            np.testing.assert_array_equal(other.failed.starts, env.failed.starts)
-
-    def test_failures_that_cannot_be_given_back(self):
-        env, home = sb3_vec_env(FLAT, 2, replay_share=0.5), np.zeros((1, 6))
-        with pytest.raises(InvalidInputError, match="starts"):
-            env.restore_failed(home[:, :5], np.ones((1, 3)))
-        with pytest.raises(InvalidInputError, match="lies outside the limits"):
-            env.restore_failed(home + 9, np.ones((1, 3)))
-        with pytest.raises(InvalidInputError, match="need an environment with a replay_share"):
-            sb3_vec_env(FLAT, 2).restore_failed(home, np.ones((1, 3)))

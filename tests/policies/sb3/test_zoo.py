@@ -4,8 +4,8 @@ import inspect
 
 import pytest
 
+from kinarm._files import shipped_files
 from kinarm.envs import ENVIRONMENTS
-from kinarm.policies import zoo_hyperparameters
 
 NAMED = {name for name in ENVIRONMENTS if not name.endswith(("/Reach-v0", "/ReachGoal-v0"))}
 """Environments of one problem; those of any have no settings that fit all."""
@@ -21,12 +21,17 @@ ALGORITHMS = {
 }
 OF_THE_ZOO = {"n_timesteps", "policy", "normalize", "env_kwargs", "monitor_kwargs", "n_envs"}
 NOISE = {"noise_type", "noise_std"}
+SHIPPED = shipped_files("zoo", ".yml")
+
+
+def test_each_algorithm_has_a_file():
+    assert set(SHIPPED) == set(ALGORITHMS)
 
 
 @pytest.mark.parametrize(("algorithm", "environments"), ALGORITHMS.items())
 def test_every_environment_has_settings(algorithm, environments):
     yaml = pytest.importorskip("yaml")
-    settings = yaml.safe_load(zoo_hyperparameters(algorithm).read_text(encoding="utf-8"))
+    settings = yaml.safe_load(SHIPPED[algorithm].read_text(encoding="utf-8"))
     assert set(settings) == environments
 
 
@@ -35,5 +40,5 @@ def test_settings_are_those_of_the_algorithm(algorithm):
     yaml = pytest.importorskip("yaml")
     zoo = pytest.importorskip("rl_zoo3")
     known = set(inspect.signature(zoo.ALGOS[algorithm]).parameters) | OF_THE_ZOO | NOISE
-    for settings in yaml.safe_load(zoo_hyperparameters(algorithm).read_text("utf-8")).values():
+    for settings in yaml.safe_load(SHIPPED[algorithm].read_text("utf-8")).values():
         assert set(settings) <= known
