@@ -7,7 +7,6 @@ from .bodies import Body as Body
 from .bodies import HeldBody as HeldBody
 from .bodies import RandomBodies as RandomBodies
 from .body_motion import BodyMotion as BodyMotion
-from .clearance import Clearance as Clearance
 from .collision import Contact as Contact
 from .envs import ExtraObservation as ExtraObservation
 from .envs import ReachEnv as ReachEnv

@@ -1,8 +1,11 @@
-"""Inverse kinematics of an arm: configurations that bring its tool to targets."""
+"""Kinematics of an arm: poses of its tool, and configurations that bring it to targets."""
 
+from abc import ABC, abstractmethod
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
+import pinocchio as pin
 from numpy.typing import ArrayLike, NDArray
 
 from kinarm._parallel import run_rows
@@ -18,7 +21,7 @@ from kinarm.errors import (
 )
 from kinarm.kernels.compiling import Array
 from kinarm.kernels.inverse import TURN, Search, solve_targets
-from kinarm.kinematics import Kinematics
+from kinarm.kernels.kinematics import follow_tool
 from kinarm.randomness import low_discrepancy_points
 
 ISOLATED_SEPARATION, CONTINUUM_SEPARATION = 1e-3, 0.2
@@ -75,8 +78,43 @@ class InverseSolutions:
         return chosen
 
 
-class InverseKinematics(Kinematics):
-    """Compiled inverse kinematics of an arm."""
+class InverseKinematics(ABC):
+    """Compiled kinematics of an arm, forwards and back; a `World` also knows about contact."""
+
+    arm: Arm
+    threads: int
+
+    @abstractmethod
+    def in_contact(self, configurations: ArrayLike) -> NDArray[np.bool_]:
+        """Tell which configurations touch something."""
+
+    @cached_property
+    def tool(self) -> Array:
+        """Pose of the tool frame, at the tool point, in the frame of the last joint, shape (4, 4).
+
+        Where it is in the world, `poses` tells.
+        """
+        model = self.arm.model
+        frame = model.frames[model.getFrameId(self.arm.tool_frame, pin.BODY)]
+        return np.array(frame.placement.homogeneous, order="C")
+
+    def poses(self, configurations: ArrayLike) -> Array:
+        """Poses of the tool, whose origin is the tool point.
+
+        Parameters
+        ----------
+        configurations : array_like, shape (n_joints,) or (n, n_joints)
+            Joint positions [rad or m].
+
+        Returns
+        -------
+        ndarray, shape (4, 4) or (n, 4, 4)
+            Homogeneous transforms to the world [m].
+        """
+        q, one = one_or_many("configurations", configurations, (self.arm.n_joints,))
+        filled = np.empty((len(q), 4, 4))
+        run_rows(follow_tool, len(q), len(q), self.threads, self.arm.chain, self.tool, q, filled)
+        return filled[0] if one else filled
 
     def inverse_kinematics(
         self,
@@ -190,7 +228,7 @@ class InverseKinematics(Kinematics):
         """Errors of position and of rotation, shape (n,) each [m, rad]."""
         poses = self.poses(configurations)
         apart = np.linalg.norm(poses[:, :3, 3] - positions, axis=1)
-        in_tool = axes @ self.tool.placement[:3, :3]
+        in_tool = axes @ self.tool[:3, :3]
         reached = in_tool @ poses[:, :3, :3].transpose(0, 2, 1)
         sines = np.linalg.norm(np.cross(reached, directions).sum(axis=1), axis=1)
         cosines = (reached * directions).sum(axis=(1, 2))
@@ -250,7 +288,7 @@ class InverseKinematics(Kinematics):
             poses, _ = one_or_many("targets", targets, (4, 4))
             _check_poses(poses)
             columns = np.ascontiguousarray(poses[:, :3, :3].transpose(0, 2, 1))
-            axes = np.ascontiguousarray(self.tool.placement[:3, :3].T)
+            axes = np.ascontiguousarray(self.tool[:3, :3].T)
             return np.ascontiguousarray(poses[:, :3, 3]), columns, axes
         positions, _ = one_or_many("targets", targets, (3,))
         if directions is None:
@@ -267,7 +305,7 @@ class InverseKinematics(Kinematics):
             axis = approach_axis(self.arm)
         else:
             given = _units("tool_axis", finite_array("tool_axis", tool_axis, (3,))[None])
-            axis = (self.tool.placement[:3, :3] * given).sum(axis=1)
+            axis = (self.tool[:3, :3] * given).sum(axis=1)
         # Copies are writable like the others: kernels are not compiled once more for them.
         return positions, np.array(along[:, None], order="C"), np.array(axis[None])
 

@@ -8,7 +8,6 @@ from numpy.typing import ArrayLike, NDArray
 
 from kinarm._parallel import available_threads, run_rows
 from kinarm.chain import Chain
-from kinarm.clearance import Clearance, measure_clearance
 from kinarm.collision import ContactModel
 from kinarm.contact_shapes import PLANE, ContactShapes, unit_boxes
 from kinarm.episode_plants import EpisodePlants
@@ -182,15 +181,6 @@ class World(GoalKinematics, StepContact, WorldChanges):
         arrays = (chain, shapes, q, scenes, tools, free, touching)
         n_proven = run_rows(self._screen_some, n, n, self.threads, *arrays)
         return tools, free, touching, n_proven
-
-    def clearance(self, configurations: ArrayLike) -> Clearance:
-        """Measure how far the closest of the tested pairs is apart, and where.
-
-        Takes configurations as `poses` does.
-        """
-        q, one = one_or_many("configurations", configurations, (self.arm.n_joints,))
-        found = measure_clearance(self.contact_model, q)
-        return Clearance(*(each[0] for each in found)) if one else found
 
     def in_contact(self, configurations: ArrayLike) -> NDArray[np.bool_]:
         """Whether configurations, as for `poses`, touch something, shape () or (n,)."""

@@ -128,6 +128,26 @@ def restarted_solutions(arm, pose, count, rng):
     return found
 
 
+class TestToolPoses:
+    def test_equal_pinocchio(self, any_simulator):
+        world, arm = any_simulator.world, any_simulator.arm
+        q, data = random_configurations(any_simulator, 1, 40), arm.model.createData()
+        number = arm.model.getFrameId(arm.tool_frame, pin.FrameType.BODY)
+        poses = world.poses(q)
+        for pose, each in zip(poses, q, strict=True):
+            pin.framesForwardKinematics(arm.model, data, each)
+            np.testing.assert_allclose(pose, data.oMf[number].homogeneous, rtol=0, atol=1e-12)
+        np.testing.assert_array_equal(poses[:, :3, 3], world.screen(q)[0])
+
+    def test_one_is_as_many(self, simulator):
+        world, q = simulator.world, random_configurations(simulator, 4, 5)
+        for ask in (world.poses, world.in_contact):
+            together = ask(q)
+            for row, each in enumerate(q):
+                np.testing.assert_array_equal(ask(each.tolist()), together[row])
+            assert ask(np.empty((0, 6))).shape == (0, *together.shape[1:])
+
+
 class TestPoses:
     def test_are_met_within_the_limits_and_the_known_one_is_among_them(self, any_simulator):
         world, arm = any_simulator.world, any_simulator.arm
