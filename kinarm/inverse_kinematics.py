@@ -123,12 +123,10 @@ class InverseKinematics(ABC):
         *,
         near: ArrayLike | None = None,
         free: bool = False,
-        tool_axis: ArrayLike | None = None,
         joints: int | None = None,
         turns: bool = False,
         most: int = 64,
         seeds: int = SEEDS,
-        separation: float | None = None,
         position_tolerance: float = POSITION_TOLERANCE,
         rotation_tolerance: float = ROTATION_TOLERANCE,
         best: bool = False,
@@ -139,7 +137,8 @@ class InverseKinematics(ABC):
         and 1e-10 rad. Solutions are *isolated*, and each is returned once, if
         no more joints move than the target has coordinates: 3 of a position, 5
         with a direction, 6 of a pose. Else, and at singular configurations,
-        they are spread over a continuum. Targets do not affect each other.
+        they are spread over a continuum, 0.2 rad or m apart in some joint. Targets
+        do not affect each other.
 
         Parameters
         ----------
@@ -147,16 +146,14 @@ class InverseKinematics(ABC):
             Positions of the tool point [m], or poses of the tool as `poses`
             gives them.
         directions : array_like, shape (3,) or (n, 3), optional
-            Directions of the tool's axis.
+            Directions of the tool's axis: that of the last joint, away from the joint
+            before.
         near : array_like, shape (n_joints,), optional
             Solutions nearest to it come first; of whole turns the nearest is
             returned. Joints that do not move rest there. Home by default [rad
             or m].
         free : bool
             Keep only solutions without contact.
-        tool_axis : array_like, shape (3,), optional
-            The tool's axis in the tool frame; by default along the last joint's
-            axis, away from the joint before.
         joints : int, optional
             Number of joints that move, from the base; by default the actuated
             ones for positions, and all that matter for poses.
@@ -167,9 +164,6 @@ class InverseKinematics(ABC):
         seeds : int
             Largest number of seeds that look for them. Where there are solutions, one of the first
             32 finds one nearly always; without, all are tried.
-        separation : float, optional
-            Least difference of two solutions in some joint; by default 0.001 if
-            they are isolated, else 0.2 [rad or m].
         position_tolerance, rotation_tolerance : float
             Errors that solutions may have where none is exact, as arms of four
             or five axes have for most poses [m, rad].
@@ -179,12 +173,12 @@ class InverseKinematics(ABC):
             one of 1 rad.
         """
         arm = self.arm
-        positions, wanted, axes = self._targets(targets, directions, tool_axis)
+        positions, wanted, axes = self._targets(targets, directions)
         start = finite_array("near", arm.home if near is None else near, (arm.n_joints,))
         start = within_limits("near", start, arm.chain, arm.joint_names)
         for name, each in (("position", position_tolerance), ("rotation", rotation_tolerance)):
             check_range(f"{name}_tolerance", each, NOT_NEGATIVE)
-        search = self._search(axes, start, joints, separation, seeds)._replace(
+        search = self._search(axes, start, joints, seeds)._replace(
             position_tolerance=position_tolerance, rotation_tolerance=rotation_tolerance
         )
         configurations, owner = self._solutions(search, positions, wanted, most)
@@ -252,17 +246,11 @@ class InverseKinematics(ABC):
         owner = np.repeat(np.arange(len(positions)), counts)
         return np.concatenate([np.empty((0, n_joints)), *found]), owner
 
-    def _search(
-        self, axes: Array, near: Array, joints: int | None, separation: float | None, seeds: int
-    ) -> Search:
+    def _search(self, axes: Array, near: Array, joints: int | None, seeds: int) -> Search:
         """Check and complete a search."""
         moved = _moved(self.arm, axes) if joints is None else joints
         moved = whole_number("joints", moved, 1, self.arm.n_joints)
         isolated = moved <= {0: 3, 1: 5, 3: 6}[len(axes)]
-        if separation is None:
-            separation = ISOLATED_SEPARATION if isolated else CONTINUUM_SEPARATION
-        if not separation > 0:
-            raise InvalidInputError(f"separation must be greater than 0, got {separation}")
         return Search(
             tool=self.arm.chain.tool,
             axes=axes,
@@ -272,19 +260,19 @@ class InverseKinematics(ABC):
             near=near,
             seeds=low_discrepancy_points(whole_number("seeds", seeds, 1), moved),
             least=LEAST_SEEDS if isolated else 0,
-            separation=float(separation),
+            separation=ISOLATED_SEPARATION if isolated else CONTINUUM_SEPARATION,
         )
 
     def _targets(
-        self, targets: ArrayLike, directions: ArrayLike | None, tool_axis: ArrayLike | None
+        self, targets: ArrayLike, directions: ArrayLike | None
     ) -> tuple[Array, Array, Array]:
         """Positions (n, 3), directions of axes of the tool (n, n_axes, 3), and these (n_axes, 3).
 
         The axes are in the last joint frame.
         """
         if np.shape(targets)[-2:] == (4, 4):
-            if directions is not None or tool_axis is not None:
-                raise InvalidInputError("a pose is wanted: directions and tool_axis do not apply")
+            if directions is not None:
+                raise InvalidInputError("a pose is wanted: directions do not apply")
             poses, _ = one_or_many("targets", targets, (4, 4))
             _check_poses(poses)
             columns = np.ascontiguousarray(poses[:, :3, :3].transpose(0, 2, 1))
@@ -292,8 +280,6 @@ class InverseKinematics(ABC):
             return np.ascontiguousarray(poses[:, :3, 3]), columns, axes
         positions, _ = one_or_many("targets", targets, (3,))
         if directions is None:
-            if tool_axis is not None:
-                raise InvalidInputError("tool_axis applies only with directions")
             return positions, np.empty((len(positions), 0, 3)), np.empty((0, 3))
         along, _ = one_or_many("directions", directions, (3,))
         if len(along) not in (1, len(positions)):
@@ -301,13 +287,9 @@ class InverseKinematics(ABC):
                 f"directions must be one or as many as targets: {len(along)} for {len(positions)}"
             )
         along = np.broadcast_to(_units("directions", along), positions.shape)
-        if tool_axis is None:
-            axis = approach_axis(self.arm)
-        else:
-            given = _units("tool_axis", finite_array("tool_axis", tool_axis, (3,))[None])
-            axis = (self.tool[:3, :3] * given).sum(axis=1)
         # Copies are writable like the others: kernels are not compiled once more for them.
-        return positions, np.array(along[:, None], order="C"), np.array(axis[None])
+        axes = np.array(approach_axis(self.arm)[None])
+        return positions, np.array(along[:, None], order="C"), axes
 
 
 def _check_poses(poses: Array) -> None:

@@ -1,6 +1,5 @@
 """The simulator: a problem, stepped in batches of episodes."""
 
-from collections.abc import Sequence
 from copy import copy
 
 import numpy as np
@@ -182,7 +181,7 @@ class Simulator(EpisodeRunner):
 
     def rollout(
         self,
-        policies: Networks | CompiledPolicy | Sequence[CompiledPolicy] | PolicyFunction,
+        policies: Networks | CompiledPolicy | PolicyFunction,
         starts: ArrayLike,
         goals: ArrayLike,
         *,
@@ -194,17 +193,17 @@ class Simulator(EpisodeRunner):
 
         Parameters
         ----------
-        policies : Networks, policy, sequence of policies, or function
-            One policy for all episodes, or one for each. Those with
-            ``networks()`` run compiled; a function from observations (n,
+        policies : Networks, policy or function
+            One policy for all episodes, or networks for each. What has
+            ``networks()`` runs compiled; a function from observations (n,
             n_observations) to actions (n, n_actions) is called once a step for
             the running episodes; if it takes ``rows``, it gets their numbers.
-            Those with an attribute ``observation`` see that, those with ``shield``
-            act behind a shield: all alike.
+            A policy with an attribute ``observation`` sees that, one with ``shield``
+            acts behind a shield.
         starts, goals, record
             As for `reset`.
         policy_index : array_like of int, shape (n,), optional
-            Compiled policy of each episode, if there are several.
+            Network of each episode, if there are several.
         shift : ndarray, shape (n_observations,), optional
             Collect moments of the observations about it.
         """
@@ -235,19 +234,10 @@ class Simulator(EpisodeRunner):
 
     def _own_of(self, policies: object) -> "Simulator":
         """The simulator that policies act in: with their own observation and shield, if any."""
-        several, own = policies if isinstance(policies, Sequence) else (policies,), self
-        seen = [getattr(each, "observation", self.problem.observation) for each in several]
-        if any(each != seen[0] for each in seen):
-            raise InvalidInputError("policies of one rollout must all see the same")
-        if seen and seen[0] != self.problem.observation:
-            own = own.seen_as(seen[0])
-        n_shielded = sum(getattr(each, "shield", False) for each in several)
-        if n_shielded and not self.problem.stepping.shield:
-            if n_shielded < len(several):
-                raise InvalidInputError(
-                    "policies of one rollout must all act behind a shield or none, got "
-                    f"{n_shielded} of {len(several)}"
-                )
+        own, seen = self, getattr(policies, "observation", self.problem.observation)
+        if seen != self.problem.observation:
+            own = own.seen_as(seen)
+        if getattr(policies, "shield", False) and not self.problem.stepping.shield:
             own = own.shielded()
         return own
 

@@ -148,7 +148,7 @@ def test_recordings_of_another_arm(replay, recordings):
 
 def test_an_arm_that_was_moved(replay, recordings, tmp_path):
     urdf = tmp_path / "moved.urdf"
-    urdf.write_text(Arm.load("paper").urdf_path.read_text())
+    urdf.write_text(Arm.load("paper").description.path.read_text())
     assert played(replay(recordings, "--arm", urdf)) == [0, 1, 2, 3]
 
 

@@ -140,7 +140,7 @@ class TestMotionBenchMaker:
     @INSTALLED
     def test_arm_touches_a_can_at_the_goal_alone(self, tmp_path, capsys):
         pytest.importorskip("yaml")
-        source = Arm.load("ur5").urdf_path
+        source = Arm.load("ur5").description.path
         package = "package://example-robot-data/robots/ur_description/meshes"
         (tmp_path / "ur5.urdf").write_text(source.read_text().replace(package, "meshes"))
         (tmp_path / "ur5.srdf").write_text('<robot name="ur5"/>')

@@ -214,20 +214,7 @@ class TestDirections:
             expected[:, 5] = 0
             assert_same(found.of(row), expected)
 
-    def test_of_an_own_axis_turn_about_it(self, simulator):
-        world, axis = simulator.world, np.array([0.6, 0.0, 0.8])
-        target = world.poses([0.3, 0.2, 0.1, 0.5, 0.4, 0.2])
-        direction = target[:3, :3] @ axis
-        found = world.inverse_kinematics(target[:3, 3], 2 * direction, tool_axis=3 * axis)
-        assert not found.isolated  # the last joint matters: 6 for 5 coordinates
-        assert len(found) > 20
-        poses = world.poses(found.configurations)
-        np.testing.assert_allclose(poses[:, :3, 3], target[None, :3, 3].repeat(len(found), 0))
-        np.testing.assert_allclose(
-            poses[:, :3, :3] @ axis, direction[None].repeat(len(found), 0), atol=1e-9
-        )
-
-    def test_by_default_of_the_axis_away_from_the_arm(self, simulator):
+    def test_are_of_the_axis_away_from_the_arm(self, simulator):
         world = simulator.world
         target = world.poses([0.3, 0.2, 0.1, 0.5, 0.4, 0.0])
         found = world.inverse_kinematics(target[:3, 3], target[:3, 0])
@@ -254,7 +241,7 @@ class TestPositions:
         known = random_configurations(any_simulator, 7, 12)
         known[:, arm.n_actuated :] = arm.home[arm.n_actuated :]
         positions = world.poses(known)[:, :3, 3]
-        found = world.inverse_kinematics(positions, separation=0.1)
+        found = world.inverse_kinematics(positions)
         assert not found.isolated
         reached = world.poses(found.configurations)[:, :3, 3]
         np.testing.assert_allclose(reached, positions[found.owner], rtol=0, atol=1e-9)
@@ -263,14 +250,13 @@ class TestPositions:
         for row in range(len(known)):
             group = found.of(row)
             apart = np.abs(group[:, None] - group).max(axis=2)
-            assert (apart[np.triu_indices(len(group), 1)] > 0.1 - 1e-12).all()
+            assert (apart[np.triu_indices(len(group), 1)] > 0.2 - 1e-12).all()
         assert len(found) > 8 * len(known)
 
-    def test_how_many_are_looked_for_and_how_far_apart(self, simulator):
+    def test_how_many_are_looked_for(self, simulator):
         ask, position = simulator.world.inverse_kinematics, [0.1, -0.5, 0.4]
         assert len(ask(position, most=5)) == 5
-        counts = [len(ask(position, most=500, separation=each)) for each in (0.2, 0.5, 1.5)]
-        assert counts[0] > counts[1] > counts[2] > 0
+        assert len(ask(position, most=500)) > 5
 
     def test_joints_that_are_not_moved_rest(self, simulator):
         world, near = simulator.world, [0.1, 0.2, 0.1, 0.3, 0.2, -4.0]
@@ -330,7 +316,7 @@ POINT = [0.1, -0.5, 0.4]
     [
         ({"targets": [0, 0]}, r"targets must have shape \(3\)"),
         ({"targets": [np.eye(4), np.diag([1, 1, -1, 1.0])]}, "target 1 is no pose"),
-        ({"targets": POINT, "tool_axis": [0, 0, 1]}, "only with directions"),
+        ({"targets": np.eye(4), "directions": [0, 0, 1]}, "directions do not apply"),
         ({"targets": POINT, "directions": np.ones((2, 3))}, "2 for 1"),
         ({"targets": POINT, "near": np.full(6, 7.0)}, "near lies outside the limits"),
     ],

@@ -79,7 +79,7 @@ class TestFile:
     def test_relative_paths_start_at_the_folder_of_the_file(
         self, write, shipped_arms, tmp_path, monkeypatch
     ):
-        shutil.copy(shipped_arms["paper"].urdf_path, tmp_path / "robot.urdf")
+        shutil.copy(shipped_arms["paper"].description.path, tmp_path / "robot.urdf")
         path = write('[arm]\nsource = "robot.urdf"\npackage_dirs = ["meshes"]')
         monkeypatch.chdir("/")
         problem = ReachProblem.load(path)
