@@ -51,7 +51,7 @@ from .scene import Mount as Mount
 from .scene import Obstacle as Obstacle
 from .scene import Scene as Scene
 from .simulator import Simulator as Simulator
-from .step_result import StepResult as StepResult
+from .simulator import StepResult as StepResult
 from .task import REWARD_TERMS as REWARD_TERMS
 from .task import ReachTask as ReachTask
 from .task import RewardWeights as RewardWeights
