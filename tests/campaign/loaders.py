@@ -28,7 +28,7 @@ from kinarm.policies import Demonstrations, Policy, load_checkpoint, recipe
 from kinarm.policies.conversion.models import load_vec_normalize, sb3_model
 from kinarm.policies.learners import state_policy
 from kinarm.problem import ReachProblem
-from kinarm.problem_files import find_scene, find_task
+from kinarm.problem_files import find_scene
 from kinarm.recording import load_recordings
 from kinarm.viewer.visual_shapes import read_mesh_file, visual_parts
 
@@ -162,12 +162,6 @@ LOADERS: dict[str, Loader] = {
         "file.toml",
     ),
     "scene": Loader(partial(samples.toml_files, "scenes"), damaged_toml, find_scene, "file.toml"),
-    "task": Loader(
-        lambda: [b'goal_regions = ["right"]\nhorizon = 64\n[reward]\nsuccess = 1.0\n'],
-        damaged_toml,
-        find_task,
-        "file.toml",
-    ),
     "arm file": Loader(
         samples.arm_files,
         damaged_toml,

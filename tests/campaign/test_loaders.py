@@ -34,10 +34,10 @@ def test_what_goes_wrong_is_noticed(monkeypatch, tmp_path):
         if number == 4:
             raise ValueError(number)
 
-    loader = LOADERS["task"]
-    monkeypatch.setitem(LOADERS, "task", type(loader)(loader.samples, loader.damage, load))
+    loader = LOADERS["scene"]
+    monkeypatch.setitem(LOADERS, "scene", type(loader)(loader.samples, loader.damage, load))
     tally = Tally()
-    fuzz("task", 6, 0, tally)
+    fuzz("scene", 6, 0, tally)
     assert tally.counts == {"inputs": 6, "accepted": 4}
     assert sorted(name.partition(" at ")[0] for name in tally.failed) == [
         "ValueError",
