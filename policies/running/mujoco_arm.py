@@ -74,10 +74,7 @@ def set_servos(model: Any, stiffness: Any, damping: Any) -> None:
 def servo_model(mujoco: ModuleType, world: World, bandwidth: float) -> Any:
     """A model of MuJoCo whose joints have critically damped servos of a bandwidth [Hz]."""
     model = arm_spec(mujoco, world, SUBSTEP, ARMATURE).compile()
-    data, inertia = mujoco.MjData(model), np.zeros((model.nv, model.nv))
-    mujoco.mj_forward(model, data)
-    mujoco.mj_fullM(model, data, inertia)
-    moved, rate = np.diag(inertia), 2.0 * np.pi * bandwidth
+    moved, rate = model.dof_M0, 2.0 * np.pi * bandwidth  # the mass that each joint moves at zero
     set_servos(model, moved * rate**2, 2.0 * moved * rate)
     return model
 
