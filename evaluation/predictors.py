@@ -17,8 +17,7 @@ from kinarm.evaluation.trials import TrialSet
 from kinarm.kernels.compiling import Array
 from kinarm.networks import takes_rows
 from kinarm.policies.policy import Policy
-from kinarm.simulator import Simulator
-from kinarm.step_result import StepResult
+from kinarm.simulator import Simulator, StepResult
 
 Wrapper = Callable[[Any], Any]
 """Wraps an environment: one of Gymnasium, or ``venv``, a ``VecEnv`` of Stable-Baselines3."""

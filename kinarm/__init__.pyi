@@ -7,7 +7,6 @@ from .bodies import Body as Body
 from .bodies import HeldBody as HeldBody
 from .bodies import RandomBodies as RandomBodies
 from .body_motion import BodyMotion as BodyMotion
-from .clearance import Clearance as Clearance
 from .collision import Contact as Contact
 from .envs import ExtraObservation as ExtraObservation
 from .envs import ReachEnv as ReachEnv
@@ -52,7 +51,7 @@ from .scene import Mount as Mount
 from .scene import Obstacle as Obstacle
 from .scene import Scene as Scene
 from .simulator import Simulator as Simulator
-from .step_result import StepResult as StepResult
+from .simulator import StepResult as StepResult
 from .task import REWARD_TERMS as REWARD_TERMS
 from .task import ReachTask as ReachTask
 from .task import RewardWeights as RewardWeights

@@ -1,11 +1,10 @@
-"""Terminals of the commands: activities and progress."""
+"""Terminals of the commands: what they wait for, and progress."""
 
 import math
 import os
 import sys
 import time
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 from datetime import timedelta
 from functools import cache
 from importlib.util import find_spec
@@ -18,54 +17,22 @@ PIPED, UNBOUNDED = 120, 1000
 """Widths of piped output, and with room for everything."""
 
 COMPILING = "compiling kernels for this processor, once (about 20 s)"
-"""Activity while kernels are compiled."""
+"""What is waited for while kernels are compiled."""
 
 LINE_SECONDS = 30.0
 """Time between lines of progress without a terminal."""
 
-_listeners: list[Callable[[str], object]] = []
-_activities = [""]
-
-
-@contextmanager
-def told_of_activities(listener: Callable[[str], object]) -> Iterator[None]:
-    """Tell a listener what begins, and what goes on when it is over, or ""."""
-    _listeners.append(listener)
-    try:
-        yield
-    finally:
-        _listeners.remove(listener)
-
-
-@contextmanager
-def doing(activity: str) -> Iterator[None]:
-    """Tell listeners of what takes long, but not of the same within it."""
-    if activity == _activities[-1]:
-        yield
-        return
-    _activities.append(activity)
-    _tell()
-    try:
-        yield
-    finally:
-        _activities.remove(activity)
-        _tell()
-
-
-def _tell() -> None:
-    for listener in _listeners:
-        listener(_activities[-1])
-    if _activities[-1] == COMPILING and not _listeners:
-        _say_why_it_waits()
-
 
 @cache
-def _say_why_it_waits() -> None:
-    """Say on a terminal, once, that kernels are compiled, where no command and no parent does."""
+def say_why_it_waits(activity: str) -> None:
+    """Say on a terminal what takes long, once; also above what shows progress there.
+
+    Only the parent of processes says it.
+    """
     from multiprocessing import parent_process
 
     if parent_process() is None and sys.stderr and sys.stderr.isatty():
-        sys.stderr.write(f"kinarm: {COMPILING}...\n")
+        sys.stderr.write(f"kinarm: {activity}...\n")
 
 
 def open_console(*, stderr: bool = False, file: IO[str] | None = None) -> "Console":
@@ -87,27 +54,6 @@ def open_console(*, stderr: bool = False, file: IO[str] | None = None) -> "Conso
         highlight=False,
         force_jupyter=None if find_spec("ipywidgets") else False,  # it needs them to redraw
     )
-
-
-@contextmanager
-def working(doing: str) -> Iterator[Callable[[str], object]]:
-    """Say what a command is doing on standard error, if that is a terminal.
-
-    Yields a function to say something else, and tells of compilation.
-    """
-    said = doing
-    with open_console(stderr=True).status(doing) as status:
-
-        def say(text: str) -> None:
-            nonlocal said
-            said = text
-            status.update(text)
-
-        def tell(activity: str) -> None:
-            status.update(f"{said}; {activity}" if activity else said)
-
-        with told_of_activities(tell):
-            yield say
 
 
 class ProgressLine:

@@ -33,9 +33,6 @@ KINDS = "biufU"
 CACHE_VARIABLE = "KINARM_CACHE"
 """Environment variable for another cache folder."""
 
-KEPT_BYTES = 256 * 2**20
-"""Largest total size of the cached files of a kind."""
-
 Arrays = Mapping[str, NDArray[Any]]
 
 
@@ -287,23 +284,13 @@ def cached_arrays(
     """Look arrays up in the cache, or make and keep them.
 
     They depend on what they are ``made_of`` alone; the version is raised when they change. A file
-    that is damaged is replaced; what cannot be written is not kept. Of a kind, beyond `KEPT_BYTES`
-    what was used least recently goes.
+    that is damaged is replaced; what cannot be written is not kept.
     """
     path = cache_folder() / f"{kind}-{hashlib.sha256(made_of).hexdigest()[:24]}.npz"
     with suppress(InvalidInputError):
-        kept = load_archive(path, kind, version, InvalidInputError).arrays
-        with suppress(OSError):
-            os.utime(path)
-        return kept
+        return load_archive(path, kind, version, InvalidInputError).arrays
     arrays = {name: np.asarray(array) for name, array in make().items()}
     with suppress(OutputError, OSError):
         check_folder(path.parent)
         save_archive(path, kind, version, arrays, {}, compress=compress)
-        files = (*path.parent.glob(f"{kind}-*.npz"), *path.parent.glob(f".{kind}-*.npz.*"))
-        total = 0
-        for each in sorted(files, key=lambda file: -file.stat().st_mtime_ns):
-            total += each.stat().st_size
-            if total > KEPT_BYTES and each != path:
-                each.unlink()
     return arrays

@@ -124,11 +124,6 @@ class Arm:
         return self.specification.name
 
     @property
-    def urdf_path(self) -> Path:
-        """The file that it was read from."""
-        return self.description.path
-
-    @property
     def tool_frame(self) -> str:
         """Frame whose origin is the tool point."""
         return self.description.tool_frame

@@ -1,4 +1,4 @@
-"""A serial chain as flat arrays; its frames, and motion bounds."""
+"""A serial chain as flat arrays, and motion bounds."""
 
 from typing import NamedTuple
 
@@ -7,9 +7,6 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from kinarm.errors import InvalidInputError
-
-FRAME_KINDS = (pin.FrameType.JOINT, pin.FrameType.BODY, pin.FrameType.FIXED_JOINT)
-"""Kinds of frames; the first kind counts for a name."""
 
 ROUNDING = 1e-6
 """How far configurations may lie beyond limits, as encoders and float32 put them [rad or m]."""
@@ -78,34 +75,6 @@ def _motion_subspace(joint: pin.JointModel) -> NDArray[np.float64]:
     data = joint.createData()
     joint.calc(data, np.zeros(1))
     return np.array(data.S).reshape(6)
-
-
-class Frame(NamedTuple):
-    """A frame fixed to a joint.
-
-    Attributes
-    ----------
-    joint : int
-        Its joint: 0 is the world, k the k-th joint.
-    placement : ndarray, shape (4, 4)
-        Homogeneous transform to the joint's frame [m].
-    """
-
-    joint: int
-    placement: NDArray[np.float64]
-
-    @classmethod
-    def of(cls, frame: pin.Frame) -> "Frame":
-        """Convert a frame of Pinocchio."""
-        return cls(int(frame.parentJoint), np.array(frame.placement.homogeneous, order="C"))
-
-
-def find_frames(model: pin.Model) -> dict[str, Frame]:
-    """Frames of joints and links of a Pinocchio model, by name."""
-    found: dict[str, Frame] = {}
-    for frame in [each for kind in FRAME_KINDS for each in model.frames if each.type == kind]:
-        found.setdefault(frame.name, Frame.of(frame))
-    return found
 
 
 class MotionBounds(NamedTuple):

@@ -1,8 +1,7 @@
-"""Distances from contact, frequencies of contact at random, and warnings."""
+"""Frequencies of contact at random, and warnings."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 import pinocchio as pin
@@ -15,41 +14,6 @@ from kinarm.contact_pairs import TOUCH_AT_HOME, make_verdicts_reliable
 from kinarm.errors import ProblemError
 from kinarm.kernels.compiling import Array
 from kinarm.scene import Scene
-
-
-class Clearance(NamedTuple):
-    """The smallest distance of the tested pairs, per configuration.
-
-    Attributes
-    ----------
-    distance : ndarray, shape (...,)
-        How far the closest pair is apart [m]; in contact, minus the way to come
-        apart. Those of hulls and cylinders are off by up to 2e-6 m.
-    bodies : ndarray of str, shape (..., 2)
-        Names of the two.
-    points : ndarray, shape (..., 2, 3)
-        Closest points on each, in the world [m].
-    """
-
-    distance: Array
-    bodies: NDArray[np.str_]
-    points: Array
-
-
-def measure_clearance(model: ContactModel, configurations: Array) -> Clearance:
-    """Let Coal find the closest tested pair of each configuration, shape (n, n_joints)."""
-    n, names = len(configurations), np.array(model.pair_names).reshape(-1, 2)
-    distances, points = np.full(n, np.inf), np.full((n, 2, 3), np.nan)
-    if not len(names):
-        return Clearance(distances, np.full((n, 2), ""), points)
-    nearest, (data, *_), placed = np.empty(n, dtype=np.int64), model.workspace, model.measuring
-    for row, q in enumerate(configurations):
-        pair = pin.computeDistances(model.arm.model, data, model.geometry, placed, q)
-        found = placed.distanceResults[pair]
-        nearest[row], distances[row] = pair, found.min_distance
-        points[row] = found.getNearestPoint1(), found.getNearestPoint2()
-    return Clearance(distances, names[nearest], points)
-
 
 SAMPLES = 2000
 

@@ -63,7 +63,7 @@ class GoalKinematics(InverseKinematics):
         """Record of what is to be reached, and how; see ``kinarm.kernels.goals``."""
         task, dt = self.problem.task, self.problem.stepping.time_step
         goal, times = task.goal, np.arange(task.horizon + 1, dtype=np.float64) * dt
-        x, y, z, w = pin.Quaternion(self.tool.placement[:3, :3]).coeffs()
+        x, y, z, w = pin.Quaternion(self.tool[:3, :3]).coeffs()
         rules = GoalRules(
             kind=goal.number,
             hold=goal.hold,
@@ -108,7 +108,7 @@ class GoalKinematics(InverseKinematics):
             n = len(rests)
             none, ends = np.zeros(0, dtype=np.int64), np.arange(1, n) / n
             return Goals(rests[:, :3], np.zeros((n, 0)), none, ends, rests[:, 3:])
-        axis = (self.tool.placement[:3, :3] * approach_axis(self.arm)[:, None]).sum(axis=0)
+        axis = (self.tool[:3, :3] * approach_axis(self.arm)[:, None]).sum(axis=0)
         if goal.axis is not None:
             along = unit(np.array(goal.axis))
             turned = along if goal.kind == "direction" else quaternion_between(axis, along)

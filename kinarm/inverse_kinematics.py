@@ -1,8 +1,11 @@
-"""Inverse kinematics of an arm: configurations that bring its tool to targets."""
+"""Kinematics of an arm: poses of its tool, and configurations that bring it to targets."""
 
+from abc import ABC, abstractmethod
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
+import pinocchio as pin
 from numpy.typing import ArrayLike, NDArray
 
 from kinarm._parallel import run_rows
@@ -18,7 +21,7 @@ from kinarm.errors import (
 )
 from kinarm.kernels.compiling import Array
 from kinarm.kernels.inverse import TURN, Search, solve_targets
-from kinarm.kinematics import Kinematics
+from kinarm.kernels.kinematics import follow_tool
 from kinarm.randomness import low_discrepancy_points
 
 ISOLATED_SEPARATION, CONTINUUM_SEPARATION = 1e-3, 0.2
@@ -75,8 +78,43 @@ class InverseSolutions:
         return chosen
 
 
-class InverseKinematics(Kinematics):
-    """Compiled inverse kinematics of an arm."""
+class InverseKinematics(ABC):
+    """Compiled kinematics of an arm, forwards and back; a `World` also knows about contact."""
+
+    arm: Arm
+    threads: int
+
+    @abstractmethod
+    def in_contact(self, configurations: ArrayLike) -> NDArray[np.bool_]:
+        """Tell which configurations touch something."""
+
+    @cached_property
+    def tool(self) -> Array:
+        """Pose of the tool frame, at the tool point, in the frame of the last joint, shape (4, 4).
+
+        Where it is in the world, `poses` tells.
+        """
+        model = self.arm.model
+        frame = model.frames[model.getFrameId(self.arm.tool_frame, pin.BODY)]
+        return np.array(frame.placement.homogeneous, order="C")
+
+    def poses(self, configurations: ArrayLike) -> Array:
+        """Poses of the tool, whose origin is the tool point.
+
+        Parameters
+        ----------
+        configurations : array_like, shape (n_joints,) or (n, n_joints)
+            Joint positions [rad or m].
+
+        Returns
+        -------
+        ndarray, shape (4, 4) or (n, 4, 4)
+            Homogeneous transforms to the world [m].
+        """
+        q, one = one_or_many("configurations", configurations, (self.arm.n_joints,))
+        filled = np.empty((len(q), 4, 4))
+        run_rows(follow_tool, len(q), len(q), self.threads, self.arm.chain, self.tool, q, filled)
+        return filled[0] if one else filled
 
     def inverse_kinematics(
         self,
@@ -85,12 +123,10 @@ class InverseKinematics(Kinematics):
         *,
         near: ArrayLike | None = None,
         free: bool = False,
-        tool_axis: ArrayLike | None = None,
         joints: int | None = None,
         turns: bool = False,
         most: int = 64,
         seeds: int = SEEDS,
-        separation: float | None = None,
         position_tolerance: float = POSITION_TOLERANCE,
         rotation_tolerance: float = ROTATION_TOLERANCE,
         best: bool = False,
@@ -101,7 +137,8 @@ class InverseKinematics(Kinematics):
         and 1e-10 rad. Solutions are *isolated*, and each is returned once, if
         no more joints move than the target has coordinates: 3 of a position, 5
         with a direction, 6 of a pose. Else, and at singular configurations,
-        they are spread over a continuum. Targets do not affect each other.
+        they are spread over a continuum, 0.2 rad or m apart in some joint. Targets
+        do not affect each other.
 
         Parameters
         ----------
@@ -109,16 +146,14 @@ class InverseKinematics(Kinematics):
             Positions of the tool point [m], or poses of the tool as `poses`
             gives them.
         directions : array_like, shape (3,) or (n, 3), optional
-            Directions of the tool's axis.
+            Directions of the tool's axis: that of the last joint, away from the joint
+            before.
         near : array_like, shape (n_joints,), optional
             Solutions nearest to it come first; of whole turns the nearest is
             returned. Joints that do not move rest there. Home by default [rad
             or m].
         free : bool
             Keep only solutions without contact.
-        tool_axis : array_like, shape (3,), optional
-            The tool's axis in the tool frame; by default along the last joint's
-            axis, away from the joint before.
         joints : int, optional
             Number of joints that move, from the base; by default the actuated
             ones for positions, and all that matter for poses.
@@ -129,9 +164,6 @@ class InverseKinematics(Kinematics):
         seeds : int
             Largest number of seeds that look for them. Where there are solutions, one of the first
             32 finds one nearly always; without, all are tried.
-        separation : float, optional
-            Least difference of two solutions in some joint; by default 0.001 if
-            they are isolated, else 0.2 [rad or m].
         position_tolerance, rotation_tolerance : float
             Errors that solutions may have where none is exact, as arms of four
             or five axes have for most poses [m, rad].
@@ -141,12 +173,12 @@ class InverseKinematics(Kinematics):
             one of 1 rad.
         """
         arm = self.arm
-        positions, wanted, axes = self._targets(targets, directions, tool_axis)
+        positions, wanted, axes = self._targets(targets, directions)
         start = finite_array("near", arm.home if near is None else near, (arm.n_joints,))
         start = within_limits("near", start, arm.chain, arm.joint_names)
         for name, each in (("position", position_tolerance), ("rotation", rotation_tolerance)):
             check_range(f"{name}_tolerance", each, NOT_NEGATIVE)
-        search = self._search(axes, start, joints, separation, seeds)._replace(
+        search = self._search(axes, start, joints, seeds)._replace(
             position_tolerance=position_tolerance, rotation_tolerance=rotation_tolerance
         )
         configurations, owner = self._solutions(search, positions, wanted, most)
@@ -190,7 +222,7 @@ class InverseKinematics(Kinematics):
         """Errors of position and of rotation, shape (n,) each [m, rad]."""
         poses = self.poses(configurations)
         apart = np.linalg.norm(poses[:, :3, 3] - positions, axis=1)
-        in_tool = axes @ self.tool.placement[:3, :3]
+        in_tool = axes @ self.tool[:3, :3]
         reached = in_tool @ poses[:, :3, :3].transpose(0, 2, 1)
         sines = np.linalg.norm(np.cross(reached, directions).sum(axis=1), axis=1)
         cosines = (reached * directions).sum(axis=(1, 2))
@@ -214,17 +246,11 @@ class InverseKinematics(Kinematics):
         owner = np.repeat(np.arange(len(positions)), counts)
         return np.concatenate([np.empty((0, n_joints)), *found]), owner
 
-    def _search(
-        self, axes: Array, near: Array, joints: int | None, separation: float | None, seeds: int
-    ) -> Search:
+    def _search(self, axes: Array, near: Array, joints: int | None, seeds: int) -> Search:
         """Check and complete a search."""
         moved = _moved(self.arm, axes) if joints is None else joints
         moved = whole_number("joints", moved, 1, self.arm.n_joints)
         isolated = moved <= {0: 3, 1: 5, 3: 6}[len(axes)]
-        if separation is None:
-            separation = ISOLATED_SEPARATION if isolated else CONTINUUM_SEPARATION
-        if not separation > 0:
-            raise InvalidInputError(f"separation must be greater than 0, got {separation}")
         return Search(
             tool=self.arm.chain.tool,
             axes=axes,
@@ -234,28 +260,26 @@ class InverseKinematics(Kinematics):
             near=near,
             seeds=low_discrepancy_points(whole_number("seeds", seeds, 1), moved),
             least=LEAST_SEEDS if isolated else 0,
-            separation=float(separation),
+            separation=ISOLATED_SEPARATION if isolated else CONTINUUM_SEPARATION,
         )
 
     def _targets(
-        self, targets: ArrayLike, directions: ArrayLike | None, tool_axis: ArrayLike | None
+        self, targets: ArrayLike, directions: ArrayLike | None
     ) -> tuple[Array, Array, Array]:
         """Positions (n, 3), directions of axes of the tool (n, n_axes, 3), and these (n_axes, 3).
 
         The axes are in the last joint frame.
         """
         if np.shape(targets)[-2:] == (4, 4):
-            if directions is not None or tool_axis is not None:
-                raise InvalidInputError("a pose is wanted: directions and tool_axis do not apply")
+            if directions is not None:
+                raise InvalidInputError("a pose is wanted: directions do not apply")
             poses, _ = one_or_many("targets", targets, (4, 4))
             _check_poses(poses)
             columns = np.ascontiguousarray(poses[:, :3, :3].transpose(0, 2, 1))
-            axes = np.ascontiguousarray(self.tool.placement[:3, :3].T)
+            axes = np.ascontiguousarray(self.tool[:3, :3].T)
             return np.ascontiguousarray(poses[:, :3, 3]), columns, axes
         positions, _ = one_or_many("targets", targets, (3,))
         if directions is None:
-            if tool_axis is not None:
-                raise InvalidInputError("tool_axis applies only with directions")
             return positions, np.empty((len(positions), 0, 3)), np.empty((0, 3))
         along, _ = one_or_many("directions", directions, (3,))
         if len(along) not in (1, len(positions)):
@@ -263,13 +287,9 @@ class InverseKinematics(Kinematics):
                 f"directions must be one or as many as targets: {len(along)} for {len(positions)}"
             )
         along = np.broadcast_to(_units("directions", along), positions.shape)
-        if tool_axis is None:
-            axis = approach_axis(self.arm)
-        else:
-            given = _units("tool_axis", finite_array("tool_axis", tool_axis, (3,))[None])
-            axis = (self.tool.placement[:3, :3] * given).sum(axis=1)
         # Copies are writable like the others: kernels are not compiled once more for them.
-        return positions, np.array(along[:, None], order="C"), np.array(axis[None])
+        axes = np.array(approach_axis(self.arm)[None])
+        return positions, np.array(along[:, None], order="C"), axes
 
 
 def _check_poses(poses: Array) -> None:

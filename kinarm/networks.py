@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from itertools import chain, pairwise
 from typing import Any, Literal, NamedTuple, Protocol, get_args, runtime_checkable
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from kinarm.episodes import Control
 from kinarm.errors import InvalidInputError, UnknownNameError, finite_array
@@ -58,15 +58,6 @@ class Mirror(NamedTuple):
     actions: Array
     side: int = 1
     goals: Array = np.array([1.0, -1.0, 1.0])
-
-    def on_the_left(self, observations: Array) -> NDArray[np.bool_]:
-        """Which observations, shape (n, n_observations), have a goal on the left."""
-        return observations[:, self.side] > 0
-
-    def from_the_right(self, observations: Array) -> Array:
-        """Reflect observations, shape (n, n_observations), of goals on the left."""
-        left = self.on_the_left(observations)
-        return np.where(left[:, None], observations * self.observations, observations)
 
     def scenarios_from_the_right(self, starts: Array, goals: Array) -> tuple[Array, Array]:
         """Reflect starts, shape (n, n_joints), and goals, shape (n, goal_width), on the left.
@@ -140,38 +131,15 @@ class Networks:
         return np.concatenate([*chain(*parts)], axis=1)
 
     @classmethod
-    def collect(cls, policies: Networks | CompiledPolicy | Sequence[CompiledPolicy]) -> Networks:
-        """Gather policies of the same layers, functions and mirror."""
+    def of(cls, policies: Networks | CompiledPolicy) -> Networks:
+        """The networks themselves, or those of a policy."""
         if isinstance(policies, Networks):
             return policies
         if isinstance(policies, CompiledPolicy):
             return policies.networks()
-        if not policies or not all(isinstance(policy, CompiledPolicy) for policy in policies):
-            raise InvalidInputError(
-                "expected Networks, a policy that offers networks(), a sequence of such policies "
-                f"or a function, got {policies!r}"
-            )
-        batch = [policy.networks() for policy in policies]
-        first = batch[0]
-        for other in batch[1:]:
-            if first.form != other.form:
-                raise InvalidInputError(
-                    "policies of one rollout must share layers, functions and mirror, got "
-                    f"{first.form[0]} and {other.form[0]}"
-                )
-        columns = zip(*(networks.layers for networks in batch), strict=True)
-        layers = (map(np.concatenate, zip(*column, strict=True)) for column in columns)
-        return replace(first, layers=tuple(Layer(*layer) for layer in layers))
-
-    @property
-    def form(self) -> tuple[object, ...]:
-        """All but the weights, to compare."""
-        signs = (
-            ()
-            if self.mirror is None
-            else (tuple(np.ravel(part).tolist()) for part in self.mirror[:3])
+        raise InvalidInputError(
+            f"expected Networks, a policy that offers networks() or a function, got {policies!r}"
         )
-        return self.widths, self.activations, tuple(signs), self.rates
 
 
 def split_parameters(parameters: Array, widths: Sequence[int]) -> Iterator[Layer]:
@@ -200,7 +168,7 @@ def takes_rows(policy: Callable[..., Any]) -> bool:
 
 
 def network_control(
-    policies: Networks | CompiledPolicy | Sequence[CompiledPolicy],
+    policies: Networks | CompiledPolicy,
     policy_index: ArrayLike | None,
     n: int,
     widths: tuple[int, int],
@@ -209,14 +177,14 @@ def network_control(
 
     Parameters
     ----------
-    policies : Networks, policy or sequence of policies
-        One for all episodes, one for each, or those of ``policy_index``.
+    policies : Networks or policy
+        One network for all episodes, one for each, or those of ``policy_index``.
     policy_index : array_like of int, shape (n,), or None
         Policy of each episode.
     n, widths
         Number of episodes, and lengths of observation and action.
     """
-    networks = Networks.collect(policies)
+    networks = Networks.of(policies)
     given = (networks.widths[0], networks.widths[-1])
     if given != widths:
         raise InvalidInputError(

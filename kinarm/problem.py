@@ -21,7 +21,7 @@ from kinarm.arm_specification import ArmSpecification
 from kinarm.errors import ProblemError, UnknownNameError
 from kinarm.observation_choice import PAPER_PARTS, Observation
 from kinarm.plant import Plant
-from kinarm.problem_files import PAPER_TASKS, find_scene, find_task, problem_names, read_problem
+from kinarm.problem_files import PAPER_TASKS, find_scene, problem_names, read_problem
 from kinarm.scene import Scene
 from kinarm.task import ReachTask, Stepping
 
@@ -125,9 +125,11 @@ class ReachProblem(Checked):
         changes = _taken(given, ReachProblem)
         if "arm" in changes:
             changes["arm"] = _specification(changes["arm"])
-        for name, find in (("scene", find_scene), ("task", find_task), ("plant", Plant.load)):
+        for name, find in (("scene", find_scene), ("plant", Plant.load)):
             if isinstance(changes.get(name), str | Path):
                 changes[name] = find(changes[name])
+        if isinstance(changes.get("task"), str | Path):
+            changes["task"] = ReachProblem.load(changes["task"]).task
         if "observation" in changes:
             changes["observation"] = self.observation.changed(changes["observation"])
         task = changes.get("task", self.task)

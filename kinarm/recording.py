@@ -128,20 +128,6 @@ class Recording:
         same_goal = np.array_equal(self.goal, other.goal)
         return same_goal and np.array_equal(self.states[0], other.states[0])
 
-    def save(self, path: str | Path) -> None:
-        """Write it alone to an ``.npz`` file; see `save_recordings`."""
-        save_recordings(path, [self])
-
-    @classmethod
-    def load(cls, path: str | Path) -> "Recording":
-        """Read the only recording of a file; see `load_recordings`."""
-        recordings = load_recordings(path)
-        if len(recordings) != 1:
-            raise RecordingFileError(
-                f"{str(path)!r} holds {len(recordings)} recordings: load_recordings reads them all"
-            )
-        return recordings[0]
-
 
 def save_recordings(path: str | Path, recordings: Sequence[Recording]) -> None:
     """Write recordings to an ``.npz`` file.

@@ -1,7 +1,7 @@
-"""The simulator: a problem, stepped in batches of episodes."""
+"""The simulator: a problem, stepped in batches of episodes, and what a step gives."""
 
-from collections.abc import Sequence
 from copy import copy
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -18,9 +18,79 @@ from kinarm.plant import PlantLike
 from kinarm.problem import ProblemLike, ReachProblem
 from kinarm.scenarios import draw_scenarios
 from kinarm.scene import Scene
-from kinarm.step_result import StepResult
 from kinarm.task import ReachTask
 from kinarm.world import World
+
+
+class StepResult(NamedTuple):
+    """Outcome of one step of n episodes, in tables that the kernel fills.
+
+    Attributes
+    ----------
+    numbers : ndarray, shape (2 + n_told + n_terms, n)
+        Rewards, distances to the goal [m], what goals have beside it
+        (``GoalSpecification.told``), and weighted terms, as in
+        ``RewardWeights.terms``. Rewards are zero for episodes that were
+        over.
+    flags : ndarray of bool, shape (3, n)
+        Truncation, success and refusal by contact; false for episodes that go
+        on or were over.
+    contact : ndarray of int, shape (n,)
+        Number, from 1, of the pair that refused the step; 0 if none or unknown.
+    task : ReachTask
+        The task.
+    """
+
+    numbers: Array
+    flags: NDArray[np.bool_]
+    contact: NDArray[np.int64]
+    task: ReachTask
+
+    @classmethod
+    def empty(cls, n: int, task: ReachTask) -> "StepResult":
+        """Empty tables for a task."""
+        rows = 2 + len(task.goal.told) + len(task.reward.terms)
+        return cls(np.empty((rows, n)), np.empty((3, n), bool), np.empty(n, np.int64), task)
+
+    @property
+    def reward(self) -> Array:
+        """Sums of the terms, shape (n,)."""
+        return self.numbers[0, :]
+
+    @property
+    def distance(self) -> Array:
+        """From the tool to the goal [m], shape (n,)."""
+        return self.numbers[1, :]
+
+    @property
+    def terms(self) -> Array:
+        """The weighted terms, shape (n, n_terms)."""
+        return self.numbers[-len(self.task.reward.terms) :].T
+
+    @property
+    def told(self) -> dict[str, Array]:
+        """What goals have beside a distance, ``turn`` and ``goals_reached``, shape (n,) each."""
+        return dict(zip(self.task.goal.told, self.numbers[2:], strict=False))
+
+    @property
+    def truncated(self) -> NDArray[np.bool_]:
+        """Whether the step ended an episode at the horizon, shape (n,)."""
+        return self.flags[0, :]
+
+    @property
+    def success(self) -> NDArray[np.bool_]:
+        """Whether it reached the goal, shape (n,)."""
+        return self.flags[1, :]
+
+    @property
+    def collision(self) -> NDArray[np.bool_]:
+        """Whether it was refused, shape (n,)."""
+        return self.flags[2, :]
+
+    @property
+    def terminated(self) -> NDArray[np.bool_]:
+        """Success or collision, shape (n,)."""
+        return self.flags[1, :] | self.flags[2, :]
 
 
 class Simulator(EpisodeRunner):
@@ -182,7 +252,7 @@ class Simulator(EpisodeRunner):
 
     def rollout(
         self,
-        policies: Networks | CompiledPolicy | Sequence[CompiledPolicy] | PolicyFunction,
+        policies: Networks | CompiledPolicy | PolicyFunction,
         starts: ArrayLike,
         goals: ArrayLike,
         *,
@@ -194,17 +264,17 @@ class Simulator(EpisodeRunner):
 
         Parameters
         ----------
-        policies : Networks, policy, sequence of policies, or function
-            One policy for all episodes, or one for each. Those with
-            ``networks()`` run compiled; a function from observations (n,
+        policies : Networks, policy or function
+            One policy for all episodes, or networks for each. What has
+            ``networks()`` runs compiled; a function from observations (n,
             n_observations) to actions (n, n_actions) is called once a step for
             the running episodes; if it takes ``rows``, it gets their numbers.
-            Those with an attribute ``observation`` see that, those with ``shield``
-            act behind a shield: all alike.
+            A policy with an attribute ``observation`` sees that, one with ``shield``
+            acts behind a shield.
         starts, goals, record
             As for `reset`.
         policy_index : array_like of int, shape (n,), optional
-            Compiled policy of each episode, if there are several.
+            Network of each episode, if there are several.
         shift : ndarray, shape (n_observations,), optional
             Collect moments of the observations about it.
         """
@@ -235,19 +305,10 @@ class Simulator(EpisodeRunner):
 
     def _own_of(self, policies: object) -> "Simulator":
         """The simulator that policies act in: with their own observation and shield, if any."""
-        several, own = policies if isinstance(policies, Sequence) else (policies,), self
-        seen = [getattr(each, "observation", self.problem.observation) for each in several]
-        if any(each != seen[0] for each in seen):
-            raise InvalidInputError("policies of one rollout must all see the same")
-        if seen and seen[0] != self.problem.observation:
-            own = own.seen_as(seen[0])
-        n_shielded = sum(getattr(each, "shield", False) for each in several)
-        if n_shielded and not self.problem.stepping.shield:
-            if n_shielded < len(several):
-                raise InvalidInputError(
-                    "policies of one rollout must all act behind a shield or none, got "
-                    f"{n_shielded} of {len(several)}"
-                )
+        own, seen = self, getattr(policies, "observation", self.problem.observation)
+        if seen != self.problem.observation:
+            own = own.seen_as(seen)
+        if getattr(policies, "shield", False) and not self.problem.stepping.shield:
             own = own.shielded()
         return own
 

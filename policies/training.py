@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, ClassVar
 
-from kinarm._console import ProgressLine, told_of_activities
+from kinarm._console import ProgressLine
 from kinarm._files import check_output, only_writer, write_text
 from kinarm._interrupts import telling
 from kinarm._tables import csv_text
@@ -33,8 +33,6 @@ from kinarm.policies.recipes import recipe
 from kinarm.problem_options import ProblemOptions, say_choices
 
 CHECKPOINT = ".checkpoint.npz"
-
-STARTING = "starting"
 
 
 def checkpoint_path(out: str | Path) -> Path:
@@ -130,19 +128,18 @@ class TrainRequest(ProblemOptions):
             return f"interrupted after {done} of {all_of_them} iterations; go on with --resume"
 
         with ProgressLine(title, config.iterations, "iterations") as line, telling(what_is_left):
-            line.update(words=[STARTING])
+            line.update(words=["starting"])
             saved = time.monotonic()
-            with told_of_activities(lambda what: line.update(words=[what or STARTING])):
-                states = training_states(config, state)
-                state = next(states)
-                for state in states:
-                    point = state.curve[-1]
-                    success = f"success {100 * point.success:.0f} %"
-                    line.update(state.iteration, [f"return {point.mean_return:+.3f}", success])
-                    if time.monotonic() - saved > CHECKPOINT_SECONDS:
-                        save_checkpoint(path, config, state)
-                        saved = time.monotonic()
-                result = TrainingResult(state_policy(config, state), state.curve, state)
+            states = training_states(config, state)
+            state = next(states)
+            for state in states:
+                point = state.curve[-1]
+                success = f"success {100 * point.success:.0f} %"
+                line.update(state.iteration, [f"return {point.mean_return:+.3f}", success])
+                if time.monotonic() - saved > CHECKPOINT_SECONDS:
+                    save_checkpoint(path, config, state)
+                    saved = time.monotonic()
+            result = TrainingResult(state_policy(config, state), state.curve, state)
             try:
                 write_curve(curve_path(self.out), result.curve)
                 result.policy.save(self.out)

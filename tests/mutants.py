@@ -44,7 +44,7 @@ AREAS = {
         (
             *("kinarm/kernels/test_*.py", *ROLLOUTS, "kinarm/test_col*.py", "kinarm/test_inv*.py"),
             *("kinarm/test_step_*.py", "kinarm/test_motion*.py", "kinarm/test_encl*.py"),
-            *("kinarm/test_frames.py", "kinarm/test_obs*.py", "kinarm/test_scenarios.py"),
+            *("kinarm/test_obs*.py", "kinarm/test_scenarios.py"),
         ),
         20,
     ),

@@ -11,10 +11,13 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import partial
 from importlib import import_module, metadata
+from itertools import combinations
 from typing import Any
 
+import coal
 import gymnasium
 import numpy as np
+import pinocchio as pin
 from numpy.typing import NDArray
 
 from docs.measurements.self_contact import of_hulls
@@ -23,12 +26,13 @@ from kinarm.envs import ReachVectorEnv
 from kinarm.evaluation.bench import VECTOR_ENVS
 from kinarm.evaluation.report.templating import markdown_table
 from kinarm.evaluation.trials import TrialSet
-from kinarm.mjcf import mjcf
 from kinarm.policies import Policy, load_policy, recipe, train_policy
 from kinarm.policies.learners import find_learner, state_policy
+from kinarm.policies.running.mujoco_arm import arm_spec, set_servos, turn
 from kinarm.policies.sb3.environment import sb3_vec_env
 from kinarm.problem import PROBLEMS
 from kinarm.simulator import Simulator
+from kinarm.world import World
 
 EPISODES = 512
 ROBOT_ITERATIONS = 20
@@ -37,6 +41,9 @@ SINGLE_STEPS, VECTOR_STEPS = 500, 100
 LEVEL, TRIALS, BUDGET, BETWEEN = 0.5, 200, 60.0, 0.25
 """Share of trials at which a training is over, how many trials there are, the time after which
 it is given up [s], and training between two looks at the policy [s]."""
+
+ARMATURE, STIFFNESS, DAMPING = 1.0, 10_000.0, 400.0
+"""Inertia of motors in MuJoCo [kg m2], and gains of their position servos."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -114,7 +121,7 @@ def driven(
     from mujoco.rollout import Rollout
 
     threads, time_step = simulator.threads, simulator.problem.stepping.time_step
-    model = mujoco.MjModel.from_xml_string(mjcf(simulator.world, time_step / tests))
+    model = mujoco_model(simulator.world, time_step / tests)
     workers = [mujoco.MjData(model) for _ in range(threads)]
     states = np.zeros(
         (len(starts), mujoco.mj_stateSize(model, mujoco.mjtState.mjSTATE_FULLPHYSICS))
@@ -128,6 +135,58 @@ def driven(
             return int(np.prod(targets.shape[:2]))
 
         yield run
+
+
+def mujoco_model(world: World, time_step: float) -> Any:
+    """A world for MuJoCo, whose joints have position servos."""
+    model = mujoco_spec(world, time_step).compile()
+    set_servos(model, STIFFNESS, DAMPING)
+    return model
+
+
+def mujoco_spec(world: World, time_step: float) -> Any:
+    """Its arm, shapes, and pairs of bodies that may touch, for MuJoCo."""
+    import mujoco
+
+    spec = arm_spec(mujoco, world, time_step, ARMATURE)
+    geometry, n_shapes = world.contact_model.geometry, world.arm.geometry.ngeoms
+    names = [
+        f"link{shape.parentJoint}" if index < n_shapes else "world"
+        for index, shape in enumerate(geometry.geometryObjects)
+    ]
+    for index, (name, shape) in enumerate(zip(names, geometry.geometryObjects, strict=True)):
+        add_shape(spec, spec.body(name), shape, f"shape{index}")
+    tested = {frozenset((names[p.first], names[p.second])) for p in geometry.collisionPairs}
+    there = ["world", *(f"link{k}" for k in range(world.arm.n_joints + 1))]
+    for first, second in combinations(there, 2):
+        if frozenset((first, second)) not in tested:
+            spec.add_exclude(bodyname1=first, bodyname2=second)
+    return spec
+
+
+def add_shape(spec: Any, body: Any, shape: pin.GeometryObject, name: str) -> None:
+    """Add a collision shape to a body of MuJoCo."""
+    from mujoco import mjtGeom
+
+    solid, placement = shape.geometry, shape.placement
+    geom = body.add_geom(name=name)
+    if isinstance(solid, coal.Capsule):
+        geom.type, size = mjtGeom.mjGEOM_CAPSULE, [solid.radius, solid.halfLength]
+    elif isinstance(solid, coal.Cylinder):
+        geom.type, size = mjtGeom.mjGEOM_CYLINDER, [solid.radius, solid.halfLength]
+    elif isinstance(solid, coal.Sphere):
+        geom.type, size = mjtGeom.mjGEOM_SPHERE, [solid.radius]
+    elif isinstance(solid, coal.Box):
+        geom.type, size = mjtGeom.mjGEOM_BOX, solid.halfSide
+    elif isinstance(solid, coal.Halfspace):
+        upwards = pin.Quaternion.FromTwoVectors(np.array([0.0, 0.0, 1.0]), np.array(solid.n))
+        placement = placement * pin.SE3(upwards.matrix(), solid.d * np.array(solid.n))
+        geom.type, size = mjtGeom.mjGEOM_PLANE, [0.0, 0.0, 1.0]
+    else:
+        spec.add_mesh(name=name, uservert=np.ravel(solid.points()))
+        geom.type, geom.meshname, size = mjtGeom.mjGEOM_MESH, name, []
+    geom.size[: len(size)] = size
+    geom.pos, geom.quat = placement.translation, turn(placement)
 
 
 def joint_targets(

@@ -5,7 +5,7 @@ from functools import partial
 from typing import TYPE_CHECKING
 
 from kinarm._command_line import run_request
-from kinarm._console import open_console, working
+from kinarm._console import open_console
 from kinarm.evaluation.request import DOCUMENT, REPORT, EvaluationRequest
 
 if TYPE_CHECKING:
@@ -16,8 +16,8 @@ def _report(request: EvaluationRequest, command: str) -> None:
     """Run a request, and print the table with its notes, or JSON."""
     from kinarm.evaluation.table import all_columns, print_table
 
-    with working("evaluating") as say:
-        document = request.run(command, say)
+    with open_console(stderr=True).status("evaluating") as status:
+        document = request.run(command, status.update)
     if request.json:
         print(json.dumps(document.to_json()))
         return

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, BinaryIO, ClassVar, cast
 
 from kinarm._command_line import Commands, run_commands
-from kinarm._console import working
+from kinarm._console import open_console
 from kinarm._files import check_output, write_atomically
 from kinarm._tables import print_table
 from kinarm.arm_specification import ArmSpecification, arm_names
@@ -88,12 +88,12 @@ class CheckRequest(ShowRequest):
         say_choices([problem])
         if self.picture is not None:
             write_picture(self.picture, problem)
-        with working("checking") as say:
+        with open_console(stderr=True).status("checking") as status:
             return check_problem(
                 World(problem),
                 self.trials,
                 self.seed,
-                lambda done, total: say(f"{done} of {total} trials solved"),
+                lambda done, total: status.update(f"{done} of {total} trials solved"),
             )
 
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, ClassVar
 import numpy as np
 
 from kinarm._command_line import option_name
-from kinarm._console import working
+from kinarm._console import open_console
 from kinarm._files import check_output
 from kinarm.errors import FROM_ZERO, InvalidInputError
 from kinarm.problem_options import ProblemOptions, say_choices
@@ -185,7 +185,7 @@ class ReplayRequest(ProblemOptions):
         from kinarm.evaluation.replay.playground import playground
 
         out = self._checked_out(PLAYGROUND)
-        with working("making the page"):
+        with open_console(stderr=True).status("making the page"):
             page = playground(self)
         page.save(out)
         report(f"written: {out}, {len(page.html) / 1e6:.1f} MB, runs offline in any browser")
@@ -199,7 +199,7 @@ class ReplayRequest(ProblemOptions):
         out = self._checked_out(PAGE)
         if self.record is not None:
             check_output(self.record, overwrite=self.overwrite, suffix=".npz")
-        with working("recording"):
+        with open_console(stderr=True).status("recording"):
             runs, groups, heading = chosen_recordings(self)
             if self.source is None:
                 say_choices([runs[0][0].problem])

@@ -23,8 +23,7 @@ from kinarm.observation_part import Ranges
 from kinarm.plant import MOST_NOISE, RANGES
 from kinarm.problem import ProblemLike, ReachProblem
 from kinarm.scenarios import ScenarioQueues
-from kinarm.simulator import Simulator
-from kinarm.step_result import StepResult
+from kinarm.simulator import Simulator, StepResult
 
 Array = NDArray[np.float64]
 Observations = Any

@@ -22,8 +22,7 @@ from kinarm.episodes import TRUNCATED, Episodes
 from kinarm.errors import InvalidInputError
 from kinarm.goals import REST_PARTS
 from kinarm.kernels.goals import errors_between
-from kinarm.simulator import Simulator
-from kinarm.step_result import StepResult
+from kinarm.simulator import Simulator, StepResult
 
 RewardType = Literal["sparse", "dense"]
 

@@ -11,7 +11,7 @@ from kinarm.envs.extra import ExtraObservation
 from kinarm.episodes import COLLISION, RUNNING, SUCCESS, TRUNCATED, Episodes
 from kinarm.errors import finite_array
 from kinarm.problem import ProblemLike
-from kinarm.step_result import StepResult
+from kinarm.simulator import StepResult
 
 FIRST_ROW = np.zeros(1, dtype=np.int64)
 """The row of a batch of one."""

@@ -32,7 +32,7 @@ from numba.core.typed_passes import InlineOverloads, NopythonRewrites
 from numba.core.untyped_passes import GenericRewrites, InlineClosureLikes
 from numpy.typing import NDArray
 
-from kinarm._console import COMPILING, doing
+from kinarm._console import COMPILING, say_why_it_waits
 from kinarm.kernels.records import RecordType
 
 Array = NDArray[np.float64]
@@ -200,11 +200,11 @@ class KernelCompiler(Compiler):
         """Compile a function and its helpers."""
         self.state.library = self.library(self.state.targetctx.codegen(), func.__qualname__)
         self.state.library.enable_object_caching()
+        say_why_it_waits(COMPILING)
         collects = gc.isenabled()
         gc.disable()
         try:
-            with doing(COMPILING):
-                return super().compile_extra(func)
+            return super().compile_extra(func)
         finally:
             if collects:
                 gc.enable()

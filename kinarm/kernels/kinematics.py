@@ -138,37 +138,27 @@ def point_jacobian(chain: Chain, poses: Array, point: Vector, jacobian: Array) -
 
 
 @kernel
-def follow_frame(
-    first: int,
-    last: int,
-    chain: Chain,
-    joint: int,
-    placement: Array,
-    configurations: Array,
-    filled: Array,
+def follow_tool(
+    first: int, last: int, chain: Chain, placement: Array, configurations: Array, filled: Array
 ) -> None:
-    """Write where a frame is at some configurations, or how it moves.
+    """Write where the tool frame is at some configurations.
 
     Parameters
     ----------
     first, last, chain
         Range of the rows, and the arm.
-    joint, placement : int and ndarray, shape (4, 4)
-        The frame's joint, 0 for the world, and its place in the joint's frame
-        [m].
+    placement : ndarray, shape (4, 4)
+        The tool frame in that of the last joint [m].
     configurations : ndarray, shape (n, n_joints)
         Joint positions [rad or m].
-    filled : ndarray, shape (n, 4, 4) or (n, 6, n_joints)
-        Where its poses in the world go [m], or its Jacobians, up to the joint
-        of the frame.
+    filled : ndarray, shape (n, 4, 4)
+        Where its poses in the world go [m].
     """
-    poses = np.zeros((configurations.shape[1] + 1, POSE))
+    joint = configurations.shape[1]
+    poses = np.zeros((joint + 1, POSE))
     for row in range(first, last):
         forward_kinematics(chain, configurations, row, poses)
         point = to_world(poses, joint, placement[0, 3], placement[1, 3], placement[2, 3])
-        if filled.shape[1] == 6:
-            point_jacobian(chain, poses, point, filled[row, :, :joint])
-            continue
         for k in range(3):
             x, y, z = placement[0, k], placement[1, k], placement[2, k]
             x, y, z = rotated(poses, joint, x, y, z)

@@ -256,7 +256,7 @@ def allow_one_step(session: Session) -> bool:
 def results_of_step(
     session: Session, numbers: Array, flags: NDArray[np.bool_], contact: NDArray[np.int64]
 ) -> None:
-    """Read a step's results into the tables of `kinarm.step_result.StepResult`."""
+    """Read a step's results into the tables of `kinarm.simulator.StepResult`."""
     episodes = session.episodes
     for e in range(contact.shape[0]):
         stepped = episodes.steps[e] == episodes.stop[e]

@@ -21,7 +21,7 @@ from stable_baselines3.common.noise import NormalActionNoise
 from stable_baselines3.common.utils import LinearSchedule
 from stable_baselines3.common.vec_env import VecEnv, VecNormalize
 
-from kinarm._console import doing
+from kinarm._console import say_why_it_waits
 from kinarm._files import first_line
 from kinarm._parallel import one_torch_thread
 from kinarm.errors import InvalidInputError
@@ -135,12 +135,12 @@ class SB3Training:
         """The algorithm after an iteration, repeated if need be."""
         if self._done == iteration:
             return self._learning.model
-        with doing(REPEATING):
-            if not 0 <= self._done < iteration:
-                self._learning.abandon()
-                self._begin()
-            while self._done < iteration:
-                self._step()
+        say_why_it_waits(REPEATING)
+        if not 0 <= self._done < iteration:
+            self._learning.abandon()
+            self._begin()
+        while self._done < iteration:
+            self._step()
         return self._learning.model
 
     def _step(self) -> None:

@@ -115,7 +115,7 @@ SMALL_URDF = b"""<?xml version="1.0" encoding="utf-8"?>
 
 def urdf() -> bytes:
     """A URDF that ships."""
-    return Arm.load("paper").urdf_path.read_bytes()
+    return Arm.load("paper").description.path.read_bytes()
 
 
 def stl(binary: bool) -> bytes:

@@ -1,7 +1,6 @@
 """The scripts in ``docs/measurements``: MuJoCo's arm is kinarm's, and operations are counted."""
 
 import tarfile
-from xml.etree import ElementTree
 
 import numpy as np
 import pytest
@@ -12,7 +11,6 @@ from docs.measurements import motionbenchmaker
 from docs.measurements.counting import OperationCounter
 from kinarm.arm import Arm
 from kinarm.kernels.network import affine_layer
-from kinarm.mjcf import mjcf
 from kinarm.policies import load_policy
 from kinarm.problem import PROBLEMS
 from kinarm.world import World
@@ -44,8 +42,10 @@ class TestMuJoCo:
     def worlds(self, request):
         """An arm, in kinarm and in MuJoCo."""
         mujoco = pytest.importorskip("mujoco")
+        from docs.measurements.peers import mujoco_model
+
         world = World(PROBLEMS["both"].replace(arm=request.param))
-        model = mujoco.MjModel.from_xml_string(mjcf(world, 0.02))
+        model = mujoco_model(world, 0.02)
         return world, model, mujoco.MjData(model)
 
     def configurations(self, world, n):
@@ -86,17 +86,17 @@ class TestMuJoCo:
     def test_every_solid_has_its_size(self, make_joint, make_collision, write_robot):
         """The mass that MuJoCo gives a solid of density 1000 is that of its volume."""
         mujoco = pytest.importorskip("mujoco")
+        from docs.measurements.peers import mujoco_spec
+
         shapes = {
             1: make_collision('<cylinder radius="0.1" length="0.3"/>', rpy="0.3 0.2 0.1"),
             2: make_collision('<sphere radius="0.1"/>'),
             3: make_collision('<box size="0.1 0.2 0.3"/>'),
         }
         path = write_robot([make_joint(), make_joint(xyz="0 0 0.5"), make_joint()], shapes)
-        document = ElementTree.fromstring(mjcf(World(PROBLEMS["right"].replace(arm=path)), 0.02))
-        for body in document.iter("body"):
-            for inertial in body.findall("inertial"):
-                body.remove(inertial)  # so that MuJoCo works it out
-        model = mujoco.MjModel.from_xml_string(ElementTree.tostring(document, encoding="unicode"))
+        spec = mujoco_spec(World(PROBLEMS["right"].replace(arm=path)), 0.02)
+        spec.compiler.inertiafromgeom = mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_TRUE
+        model = spec.compile()
         volumes = [np.pi * 0.1**2 * 0.3, 4 / 3 * np.pi * 0.1**3, 0.1 * 0.2 * 0.3]
         masses = [model.body(f"link{k}").mass[0] for k in (1, 2, 3)]
         assert masses == pytest.approx(1000 * np.array(volumes))
@@ -113,7 +113,7 @@ class TestMotionBenchMaker:
     @INSTALLED
     def test_arm_touches_a_can_at_the_goal_alone(self, tmp_path, capsys):
         pytest.importorskip("yaml")
-        source = Arm.load("ur5").urdf_path
+        source = Arm.load("ur5").description.path
         package = "package://example-robot-data/robots/ur_description/meshes"
         (tmp_path / "ur5.urdf").write_text(source.read_text().replace(package, "meshes"))
         (tmp_path / "ur5.srdf").write_text('<robot name="ur5"/>')

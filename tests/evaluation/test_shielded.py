@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 from kinarm import PROBLEMS, ReachProblem, Simulator
-from kinarm.errors import InvalidInputError
 from kinarm.evaluation import EvaluationRequest, ReplayRequest, evaluate
 from kinarm.evaluation.finding import find_contestants
 from kinarm.evaluation.replay.request import described
@@ -26,13 +25,11 @@ def test_a_shielded_policy_acts_behind_a_shield_wherever_it_is_rolled_out(policy
     scenarios = simulator.sample(np.random.default_rng(0), 400)
     expected = simulator.shielded().rollout(policy, *scenarios)
     assert expected.interventions.sum() > 0
-    for each in (safe, Policy.load(tmp_path / "safe.npz"), [safe] * 400):
+    for each in (safe, Policy.load(tmp_path / "safe.npz")):
         found = simulator.rollout(each, *scenarios)
         for column in ("configurations", "steps", "interventions"):
             np.testing.assert_array_equal(getattr(found, column), getattr(expected, column))
     assert simulator.rollout(policy, *scenarios).interventions.shape == (0,)
-    with pytest.raises(InvalidInputError, match="all act behind a shield or none, got 399 of 400"):
-        simulator.rollout([policy, *[safe] * 399], *scenarios)
 
 
 def test_it_has_a_name_and_a_group_of_its_own(policy):

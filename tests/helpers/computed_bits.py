@@ -29,7 +29,7 @@ world = simulator.world
 poses = world.poses(starts)
 pointing = world.inverse_kinematics(poses[:, :3, 3], [0, 0, -1])
 posed = world.inverse_kinematics(poses)
-show(poses, world.jacobians(starts), posed.configurations, pointing.configurations)
+show(poses, posed.configurations, pointing.configurations)
 solutions = Oracle("both").solve_batch(starts[:8], goals[:8])
 found = (solutions.actions, solutions.final_distance)
 show(solutions.steps_lower_bound, solutions.distance_lower_bound, *found)

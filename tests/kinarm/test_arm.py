@@ -110,14 +110,14 @@ class TestDigest:
         ],
     )
     def test_changes_with_anything_that_matters(self, shipped_arms, tmp_path, old, new):
-        text = shipped_arms["paper"].urdf_path.read_text(encoding="utf-8")
+        text = shipped_arms["paper"].description.path.read_text(encoding="utf-8")
         assert old in text
         path = tmp_path / "changed.urdf"
         path.write_text(text.replace(old, new))
         assert Arm.load(path).digest != shipped_arms["paper"].digest
 
     def test_does_not_depend_on_looks_or_place(self, shipped_arms, tmp_path):
-        text = shipped_arms["paper"].urdf_path.read_text(encoding="utf-8")
+        text = shipped_arms["paper"].description.path.read_text(encoding="utf-8")
         path = tmp_path / "moved.urdf"
         path.write_text(text.replace('rgba="0.96 0.74 0.1 1"', 'rgba="0 0 1 1"'))
         assert Arm.load(path).digest == shipped_arms["paper"].digest

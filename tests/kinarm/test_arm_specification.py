@@ -62,7 +62,7 @@ class TestArmFiles:
         assert arm.name == "mine"
 
     def test_source_and_folders_start_at_the_file(self, tmp_path, shipped_arms, monkeypatch):
-        urdf = shipped_arms["paper"].urdf_path.read_text()
+        urdf = shipped_arms["paper"].description.path.read_text()
         (tmp_path / "own.urdf").write_text(urdf)
         path = self.write(tmp_path, '[arm]\nsource = "own.urdf"\npackage_dirs = ["meshes"]')
         monkeypatch.chdir("/")

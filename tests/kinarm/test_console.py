@@ -2,64 +2,50 @@
 
 import io
 import re
-from functools import cache
 
 import numpy as np
-import pytest
 from rich.console import Console
 
 from kinarm import _console
-from kinarm._console import (
-    COMPILING,
-    ProgressLine,
-    _say_why_it_waits,
-    doing,
-    told_of_activities,
-)
-from kinarm.kernels.compiling import inlined, kernel
+from kinarm._console import COMPILING, ProgressLine, say_why_it_waits
+from kinarm.kernels.compiling import kernel
 
 
-def test_a_kernel_is_told_of_once_and_its_helpers_are_not():
-    @inlined
-    def doubled(x):
-        return 2.0 * x
+def fresh_terminal(monkeypatch):
+    """Standard error that is a terminal, to which nothing was said yet."""
+    error = io.StringIO()
+    error.isatty = lambda: True
+    monkeypatch.setattr("sys.stderr", error)
+    say_why_it_waits.cache_clear()
+    return error
+
+
+def test_what_is_compiled_is_said_once(monkeypatch):
+    error = fresh_terminal(monkeypatch)
 
     @kernel
     def fill(numbers):
         for i in range(len(numbers)):
-            numbers[i] = doubled(numbers[i])
+            numbers[i] = 2.0
 
-    heard = []
-    with told_of_activities(heard.append):
-        for _ in range(2):
-            fill(np.ones(3))
-    assert heard == [COMPILING, ""]
-    fill(np.ones(3, dtype=np.float32))  # compiled anew, and nobody listens
-    assert heard == [COMPILING, ""]
+    for precision in (np.float64, np.float64, np.float32):
+        fill(np.ones(3, dtype=precision))
+    assert error.getvalue() == f"kinarm: {COMPILING}...\n"
 
 
-@pytest.mark.parametrize("terminal", [True, False])
-def test_a_terminal_is_told_once_where_nobody_listens(monkeypatch, terminal):
-    monkeypatch.setattr(_console, "_say_why_it_waits", cache(_say_why_it_waits.__wrapped__))
-    error = io.StringIO()
-    error.isatty = lambda: terminal
-    monkeypatch.setattr("sys.stderr", error)
-    with told_of_activities(str), doing(COMPILING):
-        pass
+def test_nothing_is_said_where_nobody_looks(monkeypatch):
+    error = fresh_terminal(monkeypatch)
+    error.isatty = lambda: False
+    say_why_it_waits("learning")
     assert not error.getvalue()
-    for activity in ("learning", COMPILING, COMPILING):
-        with doing(activity):
-            pass
-    assert error.getvalue() == f"kinarm: {COMPILING}...\n" * terminal
 
 
-def test_one_within_another_is_told_of_and_the_same_is_not():
-    heard = []
-    with told_of_activities(heard.append), doing("learning"):
-        for each in ("learning", COMPILING):
-            with doing(each), doing(each):
-                pass
-    assert heard == ["learning", COMPILING, "learning", ""]
+def test_it_is_said_above_what_shows_progress(monkeypatch):
+    error = fresh_terminal(monkeypatch)
+    console = Console(file=error, force_terminal=True, width=80)
+    with console.status("evaluating"):
+        say_why_it_waits("learning")
+    assert re.search(r"kinarm: learning\.\.\.\n.* evaluating", error.getvalue())
 
 
 def shown(monkeypatch, width=80, **settings):

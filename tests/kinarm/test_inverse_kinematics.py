@@ -128,6 +128,26 @@ def restarted_solutions(arm, pose, count, rng):
     return found
 
 
+class TestToolPoses:
+    def test_equal_pinocchio(self, any_simulator):
+        world, arm = any_simulator.world, any_simulator.arm
+        q, data = random_configurations(any_simulator, 1, 40), arm.model.createData()
+        number = arm.model.getFrameId(arm.tool_frame, pin.FrameType.BODY)
+        poses = world.poses(q)
+        for pose, each in zip(poses, q, strict=True):
+            pin.framesForwardKinematics(arm.model, data, each)
+            np.testing.assert_allclose(pose, data.oMf[number].homogeneous, rtol=0, atol=1e-12)
+        np.testing.assert_array_equal(poses[:, :3, 3], world.screen(q)[0])
+
+    def test_one_is_as_many(self, simulator):
+        world, q = simulator.world, random_configurations(simulator, 4, 5)
+        for ask in (world.poses, world.in_contact):
+            together = ask(q)
+            for row, each in enumerate(q):
+                np.testing.assert_array_equal(ask(each.tolist()), together[row])
+            assert ask(np.empty((0, 6))).shape == (0, *together.shape[1:])
+
+
 class TestPoses:
     def test_are_met_within_the_limits_and_the_known_one_is_among_them(self, any_simulator):
         world, arm = any_simulator.world, any_simulator.arm
@@ -194,20 +214,7 @@ class TestDirections:
             expected[:, 5] = 0
             assert_same(found.of(row), expected)
 
-    def test_of_an_own_axis_turn_about_it(self, simulator):
-        world, axis = simulator.world, np.array([0.6, 0.0, 0.8])
-        target = world.poses([0.3, 0.2, 0.1, 0.5, 0.4, 0.2])
-        direction = target[:3, :3] @ axis
-        found = world.inverse_kinematics(target[:3, 3], 2 * direction, tool_axis=3 * axis)
-        assert not found.isolated  # the last joint matters: 6 for 5 coordinates
-        assert len(found) > 20
-        poses = world.poses(found.configurations)
-        np.testing.assert_allclose(poses[:, :3, 3], target[None, :3, 3].repeat(len(found), 0))
-        np.testing.assert_allclose(
-            poses[:, :3, :3] @ axis, direction[None].repeat(len(found), 0), atol=1e-9
-        )
-
-    def test_by_default_of_the_axis_away_from_the_arm(self, simulator):
+    def test_are_of_the_axis_away_from_the_arm(self, simulator):
         world = simulator.world
         target = world.poses([0.3, 0.2, 0.1, 0.5, 0.4, 0.0])
         found = world.inverse_kinematics(target[:3, 3], target[:3, 0])
@@ -234,7 +241,7 @@ class TestPositions:
         known = random_configurations(any_simulator, 7, 12)
         known[:, arm.n_actuated :] = arm.home[arm.n_actuated :]
         positions = world.poses(known)[:, :3, 3]
-        found = world.inverse_kinematics(positions, separation=0.1)
+        found = world.inverse_kinematics(positions)
         assert not found.isolated
         reached = world.poses(found.configurations)[:, :3, 3]
         np.testing.assert_allclose(reached, positions[found.owner], rtol=0, atol=1e-9)
@@ -243,14 +250,13 @@ class TestPositions:
         for row in range(len(known)):
             group = found.of(row)
             apart = np.abs(group[:, None] - group).max(axis=2)
-            assert (apart[np.triu_indices(len(group), 1)] > 0.1 - 1e-12).all()
+            assert (apart[np.triu_indices(len(group), 1)] > 0.2 - 1e-12).all()
         assert len(found) > 8 * len(known)
 
-    def test_how_many_are_looked_for_and_how_far_apart(self, simulator):
+    def test_how_many_are_looked_for(self, simulator):
         ask, position = simulator.world.inverse_kinematics, [0.1, -0.5, 0.4]
         assert len(ask(position, most=5)) == 5
-        counts = [len(ask(position, most=500, separation=each)) for each in (0.2, 0.5, 1.5)]
-        assert counts[0] > counts[1] > counts[2] > 0
+        assert len(ask(position, most=500)) > 5
 
     def test_joints_that_are_not_moved_rest(self, simulator):
         world, near = simulator.world, [0.1, 0.2, 0.1, 0.3, 0.2, -4.0]
@@ -310,7 +316,7 @@ POINT = [0.1, -0.5, 0.4]
     [
         ({"targets": [0, 0]}, r"targets must have shape \(3\)"),
         ({"targets": [np.eye(4), np.diag([1, 1, -1, 1.0])]}, "target 1 is no pose"),
-        ({"targets": POINT, "tool_axis": [0, 0, 1]}, "only with directions"),
+        ({"targets": np.eye(4), "directions": [0, 0, 1]}, "directions do not apply"),
         ({"targets": POINT, "directions": np.ones((2, 3))}, "2 for 1"),
         ({"targets": POINT, "near": np.full(6, 7.0)}, "near lies outside the limits"),
     ],

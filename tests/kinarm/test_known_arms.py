@@ -59,7 +59,7 @@ def tool_of(arm, pose):
 
 
 def test_joint_frames_and_tool_are_those_of_the_whole_robot(arm):
-    whole = pin.buildModelFromUrdf(str(arm.urdf_path))
+    whole = pin.buildModelFromUrdf(str(arm.description.path))
     data, own = whole.createData(), arm.model.createData()
     frame = whole.getFrameId(arm.specification.completed().tool_frame, pin.FrameType.BODY)
     for q in configurations(arm):
@@ -86,7 +86,7 @@ def test_kernels_agree_with_pinocchio(simulator):
 
 
 def test_limits_are_those_of_the_urdf_unless_the_arm_file_says_otherwise(arm):
-    robot, given = ElementTree.parse(arm.urdf_path), arm.specification.completed()
+    robot, given = ElementTree.parse(arm.description.path), arm.specification.completed()
     joints = {joint.get("name"): joint for joint in robot.findall("joint")}
     for index, name in enumerate(arm.joint_names):
         limit = joints[name].find("limit")
@@ -109,7 +109,7 @@ def test_home_is_free_and_inside_the_limits(arm):
 def test_agrees_with_mujocos_reading_of_the_urdf(name):
     mujoco = pytest.importorskip("mujoco")
     arm = Arm.load(name)
-    robot = ElementTree.parse(arm.urdf_path).getroot()
+    robot = ElementTree.parse(arm.description.path).getroot()
     for link in robot.findall("link"):
         for shape in ("visual", "collision"):  # kinematics alone
             for element in link.findall(shape):

@@ -193,7 +193,7 @@ class TestWithoutTheExtra:
         with pytest.raises(MissingExtraError):
             visual_shapes._versions()
         arm = Arm.load(simulators["mesh"].arm.specification)
-        path = next(iter(simulators["mesh"].arm.urdf_path.parent.glob("*.stl")))
+        path = next(iter(simulators["mesh"].arm.description.path.parent.glob("*.stl")))
         monkeypatch.setattr(
             "kinarm.viewer.visual_shapes.visual_parts", lambda _: read_mesh_file(path, (1, 1, 1))
         )

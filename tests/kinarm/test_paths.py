@@ -5,7 +5,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from kinarm import load_recordings, record_path
+from kinarm import load_recordings, record_path, save_recordings
 from kinarm.errors import InvalidInputError, StartInContactError
 from kinarm.viewer import replay_page, replay_path
 
@@ -77,7 +77,7 @@ def test_replay_in_one_call(simulator, tmp_path):
     assert (tmp_path / "path.html").read_text(encoding="utf-8") == page.html
     recording = record_path(simulator.world, path)
     assert replay_page(recording).html == page.html
-    recording.save(tmp_path / "path.npz")
+    save_recordings(tmp_path / "path.npz", [recording])
     assert load_recordings(tmp_path / "path.npz")[0].contact == recording.contact
 
 

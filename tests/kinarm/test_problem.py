@@ -94,7 +94,7 @@ def test_json_and_toml_are_without_loss(changes):
 
 class TestDigest:
     def test_ignores_whether_the_arm_is_pinned_and_where_it_lies(self, shipped_arms, tmp_path):
-        shutil.copy(shipped_arms["paper"].urdf_path, tmp_path / "paper.urdf")
+        shutil.copy(shipped_arms["paper"].description.path, tmp_path / "paper.urdf")
         assert RIGHT.pinned.digest == RIGHT.digest
         assert RIGHT.replace(arm=tmp_path / "paper.urdf").digest == RIGHT.digest
 

@@ -29,8 +29,8 @@ class TestReplace:
         flange = shipped_arms["paper_flange"]
         for source in ("paper_flange", ArmSpecification(source="paper_flange"), flange):
             assert RIGHT.replace(arm=source).arm == ArmSpecification(source="paper_flange")
-        by_path = RIGHT.replace(arm=flange.urdf_path)
-        assert by_path.arm.source == str(flange.urdf_path)
+        by_path = RIGHT.replace(arm=flange.description.path)
+        assert by_path.arm.source == str(flange.description.path)
         assert by_path.arm_digest == flange.digest
 
     def test_arm_keeps_what_it_was_loaded_with(self):

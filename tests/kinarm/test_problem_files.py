@@ -9,7 +9,7 @@ from kinarm._files import shipped_files
 from kinarm.arm import ArmSpecification
 from kinarm.errors import InvalidInputError, OutputError, ProblemError, UnknownNameError
 from kinarm.problem import PROBLEMS, ReachProblem
-from kinarm.problem_files import find_scene, find_task
+from kinarm.problem_files import find_scene
 from kinarm.scene import GoalRegion, Obstacle, Scene
 from kinarm.task import ReachTask, RewardWeights
 from kinarm.world import World
@@ -79,7 +79,7 @@ class TestFile:
     def test_relative_paths_start_at_the_folder_of_the_file(
         self, write, shipped_arms, tmp_path, monkeypatch
     ):
-        shutil.copy(shipped_arms["paper"].urdf_path, tmp_path / "robot.urdf")
+        shutil.copy(shipped_arms["paper"].description.path, tmp_path / "robot.urdf")
         path = write('[arm]\nsource = "robot.urdf"\npackage_dirs = ["meshes"]')
         monkeypatch.chdir("/")
         problem = ReachProblem.load(path)
@@ -148,18 +148,13 @@ class TestScenesAndTasks:
     def test_of_a_problem_by_name_or_file(self, write):
         assert find_scene("both") == find_scene("benches") == Scene()
         assert find_scene("shelf-panda") == ReachProblem.load("shelf-panda").scene
-        assert find_task("left") == PROBLEMS["left"].task
         path = write('base = "left"\n[task]\nhorizon = 7')
-        assert find_task(path) == PROBLEMS["left"].replace(horizon=7).task
-
-    def test_a_task_file(self, write):
-        path = write("tolerance = 0.1\nstarts = [[0, 0, 0, 0, 0, 0]]")
-        assert find_task(path) == ReachTask(tolerance=0.1, starts=((0,) * 6,))
+        assert PROBLEMS["both"].replace(task=path).task == PROBLEMS["left"].replace(horizon=7).task
 
     def test_parts_of_a_problem_file_are_names_or_files_beside_it(self, write, monkeypatch):
         write(self.BOX, "scene.toml")
-        write("horizon = 9", "task.toml")
-        path = write('arm = "paper_flange"\nscene = "scene.toml"\ntask = "task.toml"')
+        write('scene = "scene.toml"\n[task]\nhorizon = 9', "other.toml")
+        path = write('arm = "paper_flange"\nscene = "scene.toml"\ntask = "other.toml"')
         monkeypatch.chdir("/")
         problem = ReachProblem.load(path)
         assert problem.arm == ArmSpecification(source="paper_flange")
@@ -171,7 +166,7 @@ class TestScenesAndTasks:
         [
             (ReachProblem.load, "problem 'up'; available: left, right, both, .*shelf-panda"),
             (find_scene, "scene 'up'; .*both.*shelf, table, path"),
-            (find_task, "task 'up'; .*both, .*path/to/task"),
+            (lambda name: PROBLEMS["both"].replace(task=name), "problem 'up'; available: left, "),
         ],
     )
     def test_unknown_names_list_what_there_is(self, find, message):

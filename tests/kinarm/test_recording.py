@@ -5,7 +5,7 @@ from dataclasses import fields, replace
 import numpy as np
 import pytest
 
-from kinarm.errors import InvalidInputError, RecordingFileError
+from kinarm.errors import InvalidInputError
 from kinarm.recording import ARRAYS, Recording, load_recordings, record_rollouts, save_recordings
 from kinarm.scene import Obstacle, Scene
 
@@ -96,13 +96,9 @@ def test_they_survive_a_file(recordings, tmp_path):
     desk = Obstacle(name="desk", lower=(0, -1, 0), upper=(1, 1, 0.4))
     scene = Scene(obstacles=(desk,), ground=False)
     recording = elsewhere(recordings[0], scene=scene, tolerance=0.03, time_step=0.01)
-    recording.save(tmp_path / "made.npz")
-    assert same(recording, Recording.load(tmp_path / "made.npz"))
-    save_recordings(tmp_path / "many.npz", recordings)
-    loaded = load_recordings(tmp_path / "many.npz")
-    assert all(same(a, b) for a, b in zip(recordings, loaded, strict=True))
-    with pytest.raises(RecordingFileError, match="holds 40 recordings"):
-        Recording.load(tmp_path / "many.npz")
+    save_recordings(tmp_path / "made.npz", [recording, *recordings])
+    loaded = load_recordings(tmp_path / "made.npz")
+    assert all(same(a, b) for a, b in zip([recording, *recordings], loaded, strict=True))
 
 
 @pytest.mark.parametrize(

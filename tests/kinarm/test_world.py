@@ -47,7 +47,6 @@ def test_threads_do_not_matter(simulator):
         ("observe", (np.zeros((2, 5)), np.zeros((2, 3))), r"must have shape \(n, 6\)"),
         ("distances", (np.zeros((2, 6)), np.zeros((1, 3))), r"goals must have shape \(2, 3\)"),
         ("contact_pair", (np.full(6, np.nan), np.zeros(6)), "configuration must be finite"),
-        ("poses", (np.zeros(6), "claw"), "frame 'claw'; available: axis_1, axis_2"),
     ],
 )
 def test_bad_input(simulator, asked, given, message):

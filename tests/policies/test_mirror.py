@@ -44,7 +44,7 @@ def situations(simulator):
 @pytest.fixture
 def lopsided(shipped_arms, tmp_path):
     """The arm ``paper`` with one limit that its mirror image lacks."""
-    text = shipped_arms["paper"].urdf_path.read_text()
+    text = shipped_arms["paper"].description.path.read_text()
     path = tmp_path / "lopsided.urdf"
     path.write_text(re.sub('lower="[^"]*"', 'lower="-2"', text, count=1))
     return Arm.load(path)

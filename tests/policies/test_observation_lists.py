@@ -50,7 +50,7 @@ class TestMirror:
         seen = simulator.world.observe(starts, goals)
         image = simulator.world.observe(starts * axes, goals * [1, -1, 1])
         np.testing.assert_allclose(image, seen * mirror.observations, rtol=0, atol=1e-12)
-        np.testing.assert_array_equal(mirror.on_the_left(seen), goals[:, 1] > 0)
+        np.testing.assert_array_equal(seen[:, mirror.side] > 0, goals[:, 1] > 0)
 
     def test_episodes_are_mirror_images(self, simulator, policy):
         starts, goals = simulator.sample(np.random.default_rng(1), 40)

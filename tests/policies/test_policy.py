@@ -119,14 +119,6 @@ class TestNetworks:
         np.testing.assert_array_equal(compiled.collision, called.collision)
         np.testing.assert_allclose(compiled.paths, called.paths, rtol=0, atol=1e-12)
 
-    def test_many_policies_at_once(self, make_policy, simulator):
-        policies = [make_policy(seed=seed) for seed in range(4)]
-        starts, goals = simulator.sample(np.random.default_rng(4), 4)
-        together = simulator.rollout(policies, starts, goals)
-        for i, policy in enumerate(policies):
-            alone = simulator.rollout(policy, starts[i : i + 1], goals[i : i + 1])
-            assert alone.returns[0] == together.returns[i]
-
 
 class TestInvariants:
     def test_arrays_are_copied_and_frozen(self, provenance):

@@ -16,7 +16,7 @@ SCALE = 0.5
 @pytest.fixture(scope="module")
 def half_right(shipped_arms, tmp_path_factory):
     """The problem ``right`` with all lengths halved: those of arm, scene and tolerance."""
-    text = shipped_arms["paper"].urdf_path.read_text()
+    text = shipped_arms["paper"].description.path.read_text()
     lengths = re.compile(r'(?<!<axis )\b(xyz|radius|length|size)="([^"]*)"')
     path = tmp_path_factory.mktemp("half") / "half.urdf"
     path.write_text(lengths.sub(lambda found: f'{found[1]}="{halved(found[2])}"', text))

@@ -28,7 +28,7 @@ def problem(kind="position", arm="paper", tolerance=0.03, **given):
 def errors(simulator, q, goal):
     """By Pinocchio: errors of position and rest as vectors, as shares of their tolerances."""
     model, spec = simulator.arm.model, simulator.task.goal
-    data, tool = model.createData(), simulator.world.tool.placement
+    data, tool = model.createData(), simulator.world.tool
     pin.forwardKinematics(model, data, q)
     last, turn = data.oMi[model.njoints - 1], np.zeros(1)
     apart = last.rotation @ tool[:3, 3] + last.translation - goal[:3]

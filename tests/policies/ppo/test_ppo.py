@@ -211,7 +211,8 @@ def predicted(training, state, observations):
     """What the actor of a training does, given raw observations."""
     mirror, left = training.arms.mirror, np.zeros(len(observations), dtype=bool)
     if mirror is not None:
-        left, observations = mirror.on_the_left(observations), mirror.from_the_right(observations)
+        left = observations[:, mirror.side] > 0
+        observations = np.where(left[:, None], observations * mirror.observations, observations)
     seen = (observations - state.normalizer.mean) * input_scale(state.normalizer.std)
     training.networks.load(state.parameters)
     actions = np.clip(training.networks.means(seen.astype(np.float32)), -1, 1)
