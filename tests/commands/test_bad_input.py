@@ -22,7 +22,6 @@ ARMS = ", ".join(arm_names())
         ("--policy ars-tuned-both-seed0 --arm paper_flange", ["'paper_flange'", "'paper'"]),
         ("--vec-normalize none", ["--vec-normalize", "models of Stable-Baselines3"]),
         ("--json --markdown", ["exclude each other"]),
-        ("--card made.md", ["a card is of one trained policy on one problem"]),
     ],
 )
 def test_eval_refuses(run, arguments, words):

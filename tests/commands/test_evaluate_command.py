@@ -35,21 +35,13 @@ def test_a_problem_without_policies_is_told(run):
     assert answer.out.splitlines()[-1] == "no shipped policy was trained for this"
 
 
-def test_replaced_settings_have_a_star_that_names_of_files_lack(run, tmp_path):
+def test_how_steps_were_tested_in_training_is_told(run, tmp_path):
     problem = PROBLEMS["right"].replace(tested_configurations=4)
     policy = train_policy(recipe("ars", "tuned", problem=problem, iterations=1)).policy
     policy.save(tmp_path / "ars-tuned-right-seed0.npz")
-    asked = ("--policy", tmp_path, "--trials", 1, "--no-oracle", "--report", tmp_path / "page")
-    answer = run("kinarm-eval", *asked)
+    answer = run("kinarm-eval", "--policy", tmp_path, "--trials", 1, "--no-oracle")
     assert answer.status == 0, answer.err
-    label, star = "ars-tuned*-right-seed0", "* some settings of the recipe are replaced"
-    assert f" {label} " in answer.out
-    assert {star, "training tested steps for contact at 4 configurations"} <= set(
-        answer.out.splitlines()
-    )
-    page = (tmp_path / "page" / "index.html").read_text()
-    assert f"<span>{label}</span>" in page
-    assert star in page
+    assert "training tested steps for contact at 4 configurations" in answer.out.splitlines()
 
 
 def test_policies_need_no_option(evaluated, policy_folder):

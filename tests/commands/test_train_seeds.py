@@ -128,6 +128,5 @@ def test_lost_workers_are_told(run, tmp_path, monkeypatch):
     assert (answer.status, answer.err) == (
         1,
         "kinarm-train: workers ended unexpectedly: 0 of 3 seeds are finished; "
-        "the same command goes on\
-",
+        "the same command goes on\n",
     )
