@@ -19,9 +19,9 @@ from kinarm.kernels.screening import screen
 from kinarm.networks import Layer, Mirror, Networks
 from kinarm.problem import ReachProblem
 from kinarm.recording import record_path
-from kinarm.reference import ReferenceSimulator
 from kinarm.scene import Scene
 from kinarm.simulator import Simulator
+from tests.helpers.reference import ReferenceSimulator
 
 HOME = np.zeros((1, 6))
 FAR_GOAL = np.array([[0.0, 5.0, 5.0]])
