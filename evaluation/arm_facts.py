@@ -10,15 +10,15 @@ from numpy.typing import NDArray
 
 from kinarm.arm import Arm
 from kinarm.arm_specification import MOST_PIECES, ArmFile
-from kinarm.clearance import (
+from kinarm.collision import ContactModel
+from kinarm.contact_pairs import TOUCH_AT_HOME, are_neighbours, link_of, make_verdicts_reliable
+from kinarm.contact_statistics import (
     SAMPLES,
     ContactStatistics,
     arm_warnings,
     contact_on_bare_ground,
     random_configurations,
 )
-from kinarm.collision import ContactModel
-from kinarm.contact_pairs import TOUCH_AT_HOME, are_neighbours, link_of, make_verdicts_reliable
 from kinarm.evaluation.report.templating import template_environment
 
 

@@ -25,15 +25,12 @@ from kinarm.policies.policy import Policy
 from kinarm.policies.provenance import package_versions, source_commit
 from kinarm.policies.recipes import recipe
 from kinarm.problem import ReachProblem
-from kinarm.reference import ReferenceSimulator
 from kinarm.simulator import Simulator
 
 BATCHES = (48, 512, 4096)
-HEADLINE_BATCH = 512
-"""Batch that is compared with the reference path, trained and on all threads."""
 SLOW_REPETITIONS = 3
 """Most repetitions of what takes seconds."""
-REFERENCE_TRIALS, ORACLE_TRIALS = 24, 200
+ORACLE_TRIALS = 200
 VECTOR_ENVS, VECTOR_STEPS, SINGLE_STEPS = 64, 200, 2000
 
 
@@ -64,8 +61,6 @@ def measure(policy_name: str, repetitions: int, *, ppo: bool = False) -> dict[st
     rollouts = [
         row for size in BATCHES for row in _measure_rollouts(simulator, policy, size, repetitions)
     ]
-    reference = timed(lambda: reference_steps(simulator, policy), repetitions)
-    fast = [row for row in rollouts if row["batch"] == HEADLINE_BATCH][-1]
     vector, single = ReachVectorEnv(VECTOR_ENVS, problem), ReachEnv(problem)
     document = {
         "machine": {"architecture": platform.machine(), "threads": available_threads()},
@@ -74,8 +69,6 @@ def measure(policy_name: str, repetitions: int, *, ppo: bool = False) -> dict[st
         "policy": policy_name,
         "repetitions": repetitions,
         "rollouts": rollouts,
-        "reference": reference,
-        "speed_up_over_reference": fast["steps_per_second"]["median"] / reference["median"],
         "vector_environment": _measure_env(vector, (VECTOR_STEPS, VECTOR_ENVS), repetitions),
         "single_environment": _measure_env(single, (SINGLE_STEPS,), repetitions),
         "table_1_training": measure_training(problem, few),
@@ -110,14 +103,6 @@ def _measure_rollouts(
             row |= {"steps_per_second": timed(run, repetitions), "judged_share": share}
             rows.append(row)
     return rows
-
-
-def reference_steps(simulator: Simulator, policy: Policy) -> int:
-    """Steps of some episodes on the slow reference path."""
-    reference = ReferenceSimulator(simulator)
-    starts, goals = simulator.sample(np.random.default_rng(0), REFERENCE_TRIALS)
-    episodes = [reference.rollout(policy, *pair) for pair in zip(starts, goals, strict=True)]
-    return sum(len(episode.rewards) for episode in episodes)
 
 
 def _measure_env(

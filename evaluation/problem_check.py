@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from kinarm.clearance import SAMPLES, ContactStatistics, random_configurations
+from kinarm.contact_statistics import SAMPLES, ContactStatistics, random_configurations
 from kinarm.evaluation.bounds import oracle_bounds
 from kinarm.evaluation.outcomes import Pair
 from kinarm.evaluation.report.templating import template_environment

@@ -45,7 +45,6 @@ from .recording import Recording as Recording
 from .recording import load_recordings as load_recordings
 from .recording import record_path as record_path
 from .recording import save_recordings as save_recordings
-from .reference import ReferenceSimulator as ReferenceSimulator
 from .scene import GoalRegion as GoalRegion
 from .scene import Mount as Mount
 from .scene import Obstacle as Obstacle

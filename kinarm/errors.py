@@ -113,7 +113,6 @@ class StartInContactError(KinarmError):
     """
 
     def __init__(self, index: int, pair: tuple[str, str]) -> None:
-        self.index, self.pair = index, pair
         super().__init__(f"start {index} is in contact: {pair[0]} touches {pair[1]}")
 
 
@@ -149,7 +148,6 @@ class TrainingFailedError(KinarmError):
     exit_status = 1
 
     def __init__(self, reasons: Mapping[str, str], trainings: int) -> None:
-        self.reasons, self.trainings = dict(reasons), trainings
         told = "; ".join(f"{name}: {reason}" for name, reason in reasons.items())
         super().__init__(f"{len(reasons)} of {trainings} trainings failed: {told}")
 
@@ -166,7 +164,6 @@ class NoPathError(KinarmError):
     exit_status = 1
 
     def __init__(self, samples: int) -> None:
-        self.samples = samples
         many = "1 sample" if samples == 1 else f"{samples} samples"
         super().__init__(f"no path found with {many}: there may be none")
 
@@ -187,7 +184,6 @@ class MissingExtraError(KinarmError):
     """
 
     def __init__(self, package: str, extra: str) -> None:
-        self.package, self.extra = package, extra
         super().__init__(f"{package} is not installed: pip install 'kinarm[{extra}]'")
 
 

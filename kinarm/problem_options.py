@@ -111,7 +111,7 @@ def say_choices(problems: Iterable[ReachProblem]) -> None:
     for specification in dict.fromkeys(problem.arm for problem in problems):
         if specification.source not in arm_names():
             from kinarm.arm import Arm
-            from kinarm.clearance import arm_warnings, contact_on_bare_ground
+            from kinarm.contact_statistics import arm_warnings, contact_on_bare_ground
 
             arm = Arm.load(specification)
             chosen = filter(None, ["; ".join(arm.description.notes)])

@@ -15,7 +15,7 @@ import kinarm
 from kinarm._fields import to_plain
 from kinarm._files import absolute, check_folder, save_archive, shipped_files, write_atomically
 from kinarm.arm import Arm
-from kinarm.clearance import random_configurations
+from kinarm.contact_statistics import random_configurations
 from kinarm.errors import InvalidInputError, OutputError, PolicyFileError, finite_array
 from kinarm.kernels.compiling import Array
 from kinarm.policies import arm_policy, self_test

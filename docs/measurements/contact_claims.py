@@ -22,9 +22,9 @@ from kinarm import PROBLEMS, Arm, Body, GoalRegion, HeldBody, ProblemError, Simu
 from kinarm._files import write_text
 from kinarm.evaluation.report.templating import markdown_table
 from kinarm.evaluation.statistics import share_over_seeds
-from kinarm.reference import SAMPLES, ReferenceSimulator
 from tests.helpers.configurations import substeps
 from tests.helpers.random_scenes import random_scene
+from tests.helpers.reference import SAMPLES, ReferenceSimulator
 from tests.helpers.reference_episodes import assert_equal_outcome, held_actions, scripted
 
 BOTH = PROBLEMS["both"]

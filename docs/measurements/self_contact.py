@@ -8,7 +8,7 @@ import sys
 import coal
 
 from kinarm import Arm, arm_names
-from kinarm.clearance import contact_on_bare_ground
+from kinarm.contact_statistics import contact_on_bare_ground
 from kinarm.evaluation.arm_facts import SelfContact
 from kinarm.evaluation.report.templating import markdown_table
 

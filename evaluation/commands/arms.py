@@ -27,7 +27,7 @@ class ListRequest:
     def rows(self) -> list[tuple[str, ...]]:
         """A row for each arm, under `HEADINGS`; partly empty if not installed."""
         from kinarm.arm import Arm
-        from kinarm.clearance import contact_on_bare_ground
+        from kinarm.contact_statistics import contact_on_bare_ground
         from kinarm.errors import ArmError
         from kinarm.evaluation.arm_facts import joint_speeds
 

@@ -28,8 +28,6 @@ DOCUMENT = {
     ],
     "vector_environment": {"median": 400001.0, "best": 400002.0},
     "single_environment": {"median": 20001.0, "best": 20002.0},
-    "reference": {"median": 5001.0, "best": 5002.0},
-    "speed_up_over_reference": 246.8,
     "table_1_training": {
         "seconds": {"median": 1.52, "best": 1.41},
         "environment_steps": 2_300_000,
@@ -42,7 +40,7 @@ DOCUMENT = {
     },
 }
 FIGURES = (
-    *("1,234,567", "2,345,678", "400,001", "20,001", "5,001", "247 x", "1.250 %", "1.52 s"),
+    *("1,234,567", "2,345,678", "400,001", "20,001", "1.250 %", "1.52 s"),
     *("6.5 s", "5.4 s", "23.4 s", "9.9 s", "4.3 s", "321 MB", "98.8 s"),
     "2.3 million steps",
 )
@@ -61,4 +59,5 @@ def test_the_table_shows_every_figure(run, asked):
     assert (answer.status, answer.err, asked) == (0, "", [{"ppo": True}])
     shown = " ".join(answer.out.split())
     assert not [figure for figure in ("kinarm-bench --ppo", *FIGURES) if figure not in shown]
-    assert json.loads(run("kinarm-bench", "--json").out) == DOCUMENT
+    printed = json.loads(run("kinarm-bench", "--json").out)
+    assert printed == {"command": "kinarm-bench --json", **DOCUMENT}

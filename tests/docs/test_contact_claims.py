@@ -9,7 +9,7 @@ from simulators import changed
 from docs.measurements import contact_claims
 from kinarm.collision import ContactModel
 from kinarm.problem import ReachProblem
-from kinarm.reference import ReferenceSimulator
+from tests.helpers.reference import ReferenceSimulator
 
 pytestmark = pytest.mark.rare
 

@@ -4,7 +4,7 @@ import pytest
 
 from kinarm.arm import Arm
 from kinarm.arm_specification import AllowedContact
-from kinarm.clearance import contact_on_bare_ground
+from kinarm.contact_statistics import contact_on_bare_ground
 from kinarm.evaluation.arm_facts import arm_facts, untested_pairs
 
 

@@ -15,8 +15,8 @@ from kinarm.evaluation.metrics import METRICS
 from kinarm.evaluation.summary import evaluation_document
 from kinarm.evaluation.table import print_table
 from kinarm.problem import PROBLEMS, ReachProblem
-from kinarm.reference import ReferenceSimulator
 from kinarm.simulator import Simulator
+from tests.helpers.reference import ReferenceSimulator
 
 
 def made_of(evaluations, command=""):
@@ -73,7 +73,7 @@ def test_protocol_tells_how_it_was_done(document, evaluations):
 
 def test_listed_trials_can_be_simulated_again(evaluations, skilled, monkeypatch):
     """By the reference path, from nothing but the numbers in the document."""
-    monkeypatch.setattr("kinarm.reference.SAMPLES", 60)
+    monkeypatch.setattr("tests.helpers.reference.SAMPLES", 60)
     document = made_of(evaluations)
     entry, row = document["protocol"]["problems"]["right"], document["results"][1]
     reference = ReferenceSimulator(Simulator(ReachProblem.from_json(entry["problem"])))

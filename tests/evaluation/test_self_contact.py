@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from kinarm import Arm
-from kinarm.clearance import contact_on_bare_ground
+from kinarm.contact_statistics import contact_on_bare_ground
 from kinarm.evaluation.arm_facts import MUCH, SelfContact
 
 HOOK = np.array([(0, 0, 0.05), (0.06, 0.06, 0.4)]), np.array([(0, 0, 0.34), (0.4, 0.06, 0.4)])

@@ -8,7 +8,7 @@ from kinarm.kernels.records import recorded
 from kinarm.policies.oracle.aims import Aims
 from kinarm.policies.oracle.bounding import Prover
 from kinarm.policies.oracle.kernels.projection import damped_least_squares, layout
-from kinarm.reference import ReferenceSimulator
+from tests.helpers.reference import ReferenceSimulator
 
 
 def prove_steps(simulator, starts, goals, *, fewest=1, most=None, **settings):

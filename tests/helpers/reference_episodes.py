@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from kinarm.reference import ReferenceSimulator
+from tests.helpers.reference import ReferenceSimulator
 from tests.helpers.simulators import changed
 
 
@@ -39,7 +39,7 @@ def held_actions(simulator, rng, count, held=6):
 def compare_actions(simulator, seed, count, held=6, tested=4):
     """Successes, collisions and episodes that are alike, tested at few configurations a step.
 
-    That is quick; 0 has the reference look at `kinarm.reference.SAMPLES` of each.
+    That is quick; 0 has the reference look at `tests.helpers.reference.SAMPLES` of each.
     """
     simulator = changed(simulator, tested_configurations=tested)
     rng = np.random.default_rng(seed)

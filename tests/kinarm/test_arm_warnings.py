@@ -1,7 +1,7 @@
 """What makes the description of an arm doubtful."""
 
 from kinarm.arm import Arm
-from kinarm.clearance import arm_warnings, contact_on_bare_ground
+from kinarm.contact_statistics import arm_warnings, contact_on_bare_ground
 
 
 def warnings_of(path):

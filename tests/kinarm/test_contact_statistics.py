@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from kinarm.clearance import ContactStatistics, random_configurations
+from kinarm.contact_statistics import ContactStatistics, random_configurations
 from kinarm.errors import ProblemError
 
 

@@ -11,9 +11,9 @@ from kinarm.errors import KinarmError
 from kinarm.kernels.elementary import angle_of
 from kinarm.observation_choice import Observation
 from kinarm.problem import ReachProblem
-from kinarm.reference import ReferenceSimulator
 from kinarm.scenarios import draw_followers
 from kinarm.simulator import Simulator
+from tests.helpers.reference import ReferenceSimulator
 
 N, HORIZON = 8, 64
 

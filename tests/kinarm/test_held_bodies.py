@@ -10,8 +10,8 @@ from reference_episodes import compare_actions
 from kinarm import Arm, ReachProblem, Simulator
 from kinarm.arm_specification import AllowedContact, ArmSpecification
 from kinarm.bodies import SHAPES, HeldBody
-from kinarm.clearance import contact_on_bare_ground
 from kinarm.contact_pairs import TOUCH_AT_HOME
+from kinarm.contact_statistics import contact_on_bare_ground
 from kinarm.errors import KinarmError
 from kinarm.viewer.visual_shapes import arm_parts
 

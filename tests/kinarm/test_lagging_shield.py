@@ -7,9 +7,9 @@ from reference_episodes import held_actions
 
 from kinarm.kernels.plant import COMMAND, MOST_CHANGE, RATE, STEADY
 from kinarm.plant import Plant
-from kinarm.reference_plant import ReferencePlant
 from kinarm.shield import shield_table
 from kinarm.simulator import Simulator
+from tests.helpers.reference_plant import ReferencePlant
 
 PLANTS = {
     "hard": "hard",

@@ -121,7 +121,7 @@ class TestEpisodes:
         assert 0.3 * count < collisions < count
 
     def test_are_those_of_the_reference_for_the_whole_motion(self, monkeypatch):
-        monkeypatch.setattr("kinarm.reference.SAMPLES", 300)
+        monkeypatch.setattr("tests.helpers.reference.SAMPLES", 300)
         assert compare_actions(Simulator(busy(horizon=20)), 5, 3, tested=0)[1] > 0
 
     def test_what_moves_meets_an_arm_that_rests(self, passing):

@@ -19,8 +19,8 @@ from kinarm.kernels.surroundings import NEAR
 from kinarm.networks import Layer, Networks
 from kinarm.observation import OBSERVATION
 from kinarm.observation_choice import CERTAIN
-from kinarm.reference import ReferenceSimulator
 from kinarm.scene import Scene
+from tests.helpers.reference import ReferenceSimulator
 
 BOTH = ReachProblem.load("both")
 OF_RESTS = (*GOAL_RESTS, *REST_ERRORS)

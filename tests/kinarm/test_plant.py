@@ -8,8 +8,8 @@ from scipy.integrate import solve_ivp
 from kinarm.errors import KinarmError
 from kinarm.plant import Plant
 from kinarm.problem import ReachProblem
-from kinarm.reference import ReferenceSimulator
 from kinarm.simulator import Simulator
+from tests.helpers.reference import ReferenceSimulator
 
 EVERYTHING = {
     "delay": (0, 3),

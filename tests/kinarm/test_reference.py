@@ -12,10 +12,10 @@ from kinarm.networks import Layer, Networks, split_parameters
 from kinarm.policies.arm_policy import activated
 from kinarm.policies.library import load_policy
 from kinarm.problem import ReachProblem
-from kinarm.reference import ReferenceSimulator
 from kinarm.scene import GoalRegion, Obstacle, Scene
 from kinarm.simulator import Simulator
 from kinarm.task import ReachTask, RewardWeights
+from tests.helpers.reference import ReferenceSimulator
 
 REWARD = RewardWeights(progress=1.5, closer=0.03, collision=-0.7, success=0.4, step=-0.01)
 

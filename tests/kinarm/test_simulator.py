@@ -19,9 +19,9 @@ from kinarm.kernels.screening import screen
 from kinarm.networks import Layer, Mirror, Networks
 from kinarm.problem import ReachProblem
 from kinarm.recording import record_path
-from kinarm.reference import ReferenceSimulator
 from kinarm.scene import Scene
 from kinarm.simulator import Simulator
+from tests.helpers.reference import ReferenceSimulator
 
 HOME = np.zeros((1, 6))
 FAR_GOAL = np.array([[0.0, 5.0, 5.0]])
@@ -228,11 +228,9 @@ class TestRefusals:
     def test_start_in_contact_names_the_pair(self, simulator):
         starts = np.deg2rad([[0.0] * 6, [0, 110, -60, 0, 0, 0]])
         pair = simulator.world.contact_model.contact_pair(starts[1])
-        with pytest.raises(
-            StartInContactError, match="start 1 is in contact: .* touches"
-        ) as caught:
+        message = f"start 1 is in contact: {pair[0]} touches {pair[1]}$"
+        with pytest.raises(StartInContactError, match=message):
             asked(simulator, starts=starts, goals=np.tile(FAR_GOAL, (2, 1)))
-        assert (caught.value.index, caught.value.pair) == (1, pair)
 
     @pytest.mark.parametrize(
         ("given", "message"),

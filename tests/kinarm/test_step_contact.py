@@ -49,7 +49,7 @@ def test_a_pen_never_passes_a_thin_plate(pen):
 @pytest.mark.parametrize("name", ["paper", "sliding", "mesh", "bodies"])
 def test_outcomes_are_those_of_many_configurations(simulators, name, monkeypatch):
     """Hundreds of a step, which lie half a millimetre apart."""
-    monkeypatch.setattr("kinarm.reference.SAMPLES", 300)
+    monkeypatch.setattr("tests.helpers.reference.SAMPLES", 300)
     _, collisions, count = compare_actions(simulators[name], 13, 5, tested=0)
     assert 0 < collisions <= count
 

@@ -23,8 +23,8 @@ from kinarm.policies.checkpoint import load_checkpoint, save_checkpoint
 from kinarm.policies.mirror import problem_mirror
 from kinarm.policies.normalizer import Normalizer
 from kinarm.problem import PROBLEMS
-from kinarm.reference import ReferenceSimulator
 from kinarm.task import RewardWeights
+from tests.helpers.reference import ReferenceSimulator
 
 SHORT = PROBLEMS["right"].replace(horizon=8, tested_configurations=4)
 TINY = ARSConfig(problem=SHORT, directions=4, top_directions=2, iterations=6, seed=5)

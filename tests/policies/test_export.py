@@ -14,7 +14,7 @@ from known_arms import INSTALLED
 from random_policies import policy_for, sliding
 
 from kinarm import ReachProblem, Scene, Simulator
-from kinarm.clearance import random_configurations
+from kinarm.contact_statistics import random_configurations
 from kinarm.errors import ArmError, InvalidInputError, OutputError
 from kinarm.observation import OBSERVATION
 from kinarm.observation_choice import Observation

@@ -9,8 +9,8 @@ from simulators import changed
 
 from kinarm.kernels import reward
 from kinarm.kernels.reward import add_reward
-from kinarm.reference import ReferenceSimulator
 from kinarm.task import REWARD_TERMS, RewardWeights
+from tests.helpers.reference import ReferenceSimulator
 
 weight = st.floats(-10, 10)
 distance = st.floats(0, 3)

@@ -1,7 +1,7 @@
 """The slow reference: the simulator's semantics in plain Pinocchio and Coal, step by step.
 
-It shares no kernel with `kinarm.simulator` and asks Coal about every tested configuration. Tests
-and ``kinarm-bench`` compare with it.
+It shares no kernel with `kinarm.simulator` and asks Coal about every tested configuration. The
+tests hold whole episodes of the two against each other.
 """
 
 from collections.abc import Callable
@@ -20,10 +20,10 @@ from kinarm.inverse_kinematics import approach_axis
 from kinarm.kernels.compiling import Array
 from kinarm.kernels.inverse import DAMPING, LEAST_DAMPING
 from kinarm.observation_part import SLOTS
-from kinarm.reference_plant import ReferencePlant
 from kinarm.scenarios import draw_followers
 from kinarm.simulator import Simulator
 from kinarm.world import World
+from tests.helpers.reference_plant import ReferencePlant
 
 
 class ReferenceEpisode(NamedTuple):
