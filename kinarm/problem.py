@@ -100,7 +100,10 @@ class ReachProblem(Checked):
         if str(problem) in PROBLEMS:
             return PROBLEMS[str(problem)]
         path = named_file("problem", problem, PAPER_TASKS)
-        read = cls.from_json(read_problem(path), str(path))
+        entries = read_problem(path)
+        if isinstance(entries["task"], str):
+            entries["task"] = to_plain(cls.load(entries["task"]).task)
+        read = cls.from_json(entries, str(path))
         return replace(read, arm=read.arm.resolved(absolute(path).parent))
 
     def replace(self, **overrides: Any) -> "ReachProblem":

@@ -32,7 +32,7 @@ def read_problem(path: Path) -> dict[str, Any]:
     """Read a problem file, as a table of what differs from the defaults.
 
     Parts are tables; ``arm`` and ``scene`` may also be names or files, and ``task`` those of
-    another problem. The problem ``base`` has the rest. By default all goal regions of another
+    another problem, which stay. The problem ``base`` has the rest. By default all goal regions of another
     scene are to be reached.
     """
     entries = read_toml(path, "problem")
@@ -50,9 +50,7 @@ def read_problem(path: Path) -> dict[str, Any]:
     if isinstance(entries.get("plant"), str):
         entries["plant"] = to_plain(Plant.load(_beside(path, entries["plant"])))
     if isinstance(task, str):
-        from kinarm.problem import ReachProblem
-
-        entries["task"] = to_plain(ReachProblem.load(_beside(path, task)).task)
+        entries["task"] = str(_beside(path, task))
     elif isinstance(task, Mapping):
         new = isinstance(scene, str) or (isinstance(scene, Mapping) and "goal_regions" in scene)
         entries["task"] = {"goal_regions": () if new else regions, **task}
