@@ -1,23 +1,25 @@
-"""Trials to replay: new ones, or recordings of a file."""
+"""Recordings to replay: of trials that are run now, or of a file."""
 
 from collections import Counter
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, NamedTuple
 
-from kinarm.errors import InvalidInputError, UnknownNameError
+from kinarm._fields import to_plain
+from kinarm.errors import InvalidInputError
 from kinarm.evaluation.bounds import oracle_bounds
 from kinarm.evaluation.contestants import ORACLE, Contestant
 from kinarm.evaluation.finding import check_normalizing, find_contestants
 from kinarm.evaluation.outcomes import failure_causes
-from kinarm.evaluation.replay.runs import record
 from kinarm.evaluation.trials import TrialSet
-from kinarm.policies.library import BEST, group_of
+from kinarm.policies.library import BEST
+from kinarm.policies.oracle.solutions import OracleSolutions
+from kinarm.policies.provenance import package_versions, source_commit
 from kinarm.problem import ReachProblem
-from kinarm.recording import Recording, load_recordings
+from kinarm.recording import Recording, load_recordings, record_rollouts
 
 if TYPE_CHECKING:
-    from kinarm.evaluation.replay.request import ReplayRequest
+    from kinarm.evaluation.commands.replay import ReplayRequest
 
 PLAYED, SEARCHED, FAILING = 5, 200, 10_000
 """Default numbers of trials: to play, to choose from, to look for failures in."""
@@ -27,6 +29,57 @@ MOST_FAILURES = 500
 
 Trial = tuple[Recording, ...]
 """One trial as run by one policy, or by two."""
+
+
+def record(
+    contestant: Contestant,
+    trials: TrialSet,
+    numbers: Sequence[int] | None = None,
+    *,
+    bounds: OracleSolutions | None = None,
+    allow_other_arm: bool = False,
+) -> list[Recording]:
+    """Run a contestant on trials and record its motions.
+
+    Parameters
+    ----------
+    contestant : Contestant
+        The policy, baseline or oracle.
+    trials : TrialSet
+        The trials that it faces.
+    numbers : sequence of int, optional
+        Trials to keep, in this order; all by default.
+    bounds : OracleSolutions, optional
+        The oracle's bounds of the trials, or of the first ones.
+    allow_other_arm : bool
+        Whether a policy may face an arm that it was not trained for.
+
+    Raises
+    ------
+    InvalidInputError
+        If there is no trial of such a number.
+    PolicyFileError
+        If the policy was trained for another arm, which is not allowed.
+    """
+    simulator = trials.simulator
+    contestant.check(simulator.problem, simulator.arm, allow_other_arm=allow_other_arm)
+    rollouts = contestant.run(trials, record=True)
+    made = to_plain(contestant.policy.provenance) if contestant.policy else None
+    known = [] if bounds is None else bounds.steps_lower_bound.tolist()
+    return record_rollouts(
+        trials.simulator,
+        rollouts,
+        contestant.name,
+        numbers,
+        steps_lower_bound=dict(enumerate(known)).get,
+        provenance={
+            "trial_seed": trials.seed,
+            "policy": made,
+            "versions": package_versions(),
+            "commit": source_commit(),
+            **({"note": note} if (note := contestant.note_on(trials.problem)) else {}),
+        },
+    )
 
 
 @dataclass(frozen=True)
@@ -73,25 +126,16 @@ def chosen_recordings(request: "ReplayRequest") -> Chosen:
 
 def _find_candidates(request: "ReplayRequest") -> Candidates:
     """Make or read the recordings to choose from."""
-    default = BEST if request.failures and request.source is None else None
-    names = request.compare or (request.policy or default,)
     if request.source is None:
-        return _fresh_candidates(request, names)
-    problem, arm, runs = request.problem, request.arm, []
-    recorded = load_recordings(request.source)
-    found = [each for each in recorded if problem in (None, each.problem.name)]
+        default = BEST if request.failures else None
+        return _fresh_candidates(request, request.compare or (request.policy or default,))
+    found, arm = load_recordings(request.source), request.arm
+    if not found:
+        raise InvalidInputError(f"{str(request.source)!r} holds no recording")
     if arm is not None:  # where their URDF lies now
         moved = (each.problem.replace(arm=replace(each.problem.arm, source=arm)) for each in found)
         found = [replace(each, problem=new) for each, new in zip(found, moved, strict=True)]
-    for name in names:
-        run = [each for each in found if name in (None, each.policy, group_of(each.policy))]
-        if name is not None and not run:
-            raise UnknownNameError("policy", name, dict.fromkeys(each.policy for each in found))
-        runs.append(run)
-    trials = list(zip(*runs, strict=False))
-    if not trials:
-        raise InvalidInputError(f"{str(request.source)!r} holds no recording that fits")
-    return Candidates(trials, len(trials))
+    return Candidates([(each,) for each in found], len(found))
 
 
 def _fresh_candidates(request: "ReplayRequest", names: Sequence[str | None]) -> Candidates:
