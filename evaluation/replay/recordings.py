@@ -84,10 +84,9 @@ def record(
 
 @dataclass(frozen=True)
 class Candidates:
-    """Trials to choose from, how many are played by default, and their set."""
+    """Trials to choose from, and their set if they are run now."""
 
     trials: list[Trial]
-    played: int
     faced: TrialSet | None = None
 
 
@@ -120,25 +119,27 @@ def chosen_recordings(request: "ReplayRequest") -> Chosen:
     elif request.worst is not None:
         chosen = _worst(trials, request.worst)
     else:
-        chosen = trials[: candidates.played]
+        chosen = trials
     return Chosen(_with_bounds(candidates, chosen, oracle=request.oracle))
 
 
 def _find_candidates(request: "ReplayRequest") -> Candidates:
     """Make or read the recordings to choose from."""
     if request.source is None:
-        default = BEST if request.failures else None
-        return _fresh_candidates(request, request.compare or (request.policy or default,))
+        policy = request.policy or (BEST if request.failures else "")
+        if not (policy or request.compare):
+            raise InvalidInputError("name a --policy, or a file of recordings")
+        return _fresh_candidates(request, request.compare or (policy,))
     found, arm = load_recordings(request.source), request.arm
     if not found:
         raise InvalidInputError(f"{str(request.source)!r} holds no recording")
     if arm is not None:  # where their URDF lies now
         moved = (each.problem.replace(arm=replace(each.problem.arm, source=arm)) for each in found)
         found = [replace(each, problem=new) for each, new in zip(found, moved, strict=True)]
-    return Candidates([(each,) for each in found], len(found))
+    return Candidates([(each,) for each in found])
 
 
-def _fresh_candidates(request: "ReplayRequest", names: Sequence[str | None]) -> Candidates:
+def _fresh_candidates(request: "ReplayRequest", names: Sequence[str]) -> Candidates:
     """Run policies on trials that are drawn now."""
     contestants, problem = named_contestants(request, names)
     searched = request.trial or request.worst
@@ -146,20 +147,22 @@ def _fresh_candidates(request: "ReplayRequest", names: Sequence[str | None]) -> 
     trials = TrialSet.draw(problem, count, request.seed or 0)
     other = request.allow_other_arm
     runs = [record(contestant, trials, allow_other_arm=other) for contestant in contestants]
-    return Candidates(list(zip(*runs, strict=True)), count, trials)
+    return Candidates(list(zip(*runs, strict=True)), trials)
 
 
 def named_contestants(
-    request: "ReplayRequest", names: Sequence[str | None]
+    request: "ReplayRequest", names: Sequence[str]
 ) -> tuple[list[Contestant], ReachProblem]:
-    """The contestants of names, and the problem that they face.
+    """The contestants of names, of groups the first seeds, and the problem that they face.
 
     The request names it (for the best policy, the usual one by default), or
     changes that of the first trained contestant.
     """
     named = request.problem is not None or request.task is not None
     stated = request.resolve() if named or BEST in names else None
-    contestants = [_first_contestant(name, stated, request) for name in names]
+    contestants = [
+        find_contestants(name, stated, request.vec_normalize, request.wrapper)[0] for name in names
+    ]
     check_normalizing(contestants, request.vec_normalize)
     if request.shield:
         contestants = [each.shielded() for each in contestants]
@@ -169,15 +172,6 @@ def named_contestants(
     if not trained:
         raise InvalidInputError(f"{contestants[0].name!r} was not trained: name a --problem")
     return contestants, request.resolve(trained[0])
-
-
-def _first_contestant(
-    name: str | None, problem: ReachProblem | None, request: "ReplayRequest"
-) -> Contestant:
-    """The contestant of a name, of a group the first seed."""
-    if name is None:
-        raise InvalidInputError("name a --policy, or a file of recordings")
-    return find_contestants(name, problem, request.vec_normalize, request.wrapper)[0]
 
 
 def _with_bounds(
