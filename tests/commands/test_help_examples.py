@@ -49,13 +49,13 @@ def examples_of(run, tmp_path, monkeypatch, policy):
     ("words", "least"),
     [
         (("kinarm-bench",), 2),
-        (("kinarm-eval",), 11),
+        (("kinarm-eval",), 10),
         (("kinarm-replay",), 8),
         (("kinarm-reproduce",), 3),
         (("kinarm-study",), 6),
         (("kinarm-train",), 3),
-        (("kinarm-train", "ars"), 5),
-        (("kinarm-train", "ppo"), 5),
+        (("kinarm-train", "ars"), 4),
+        (("kinarm-train", "ppo"), 4),
     ],
 )
 def test_what_takes_long_is_accepted(run, examples_of, monkeypatch, words, least):
