@@ -1,4 +1,5 @@
 from .bounds import oracle_bounds as oracle_bounds
+from .commands.replay import ReplayRequest as ReplayRequest
 from .contestants import Contestant as Contestant
 from .document import EvaluationDocument as EvaluationDocument
 from .evaluation import Evaluation as Evaluation
@@ -10,8 +11,7 @@ from .finding import find_contestants as find_contestants
 from .metrics import METRICS as METRICS
 from .metrics import Metric as Metric
 from .outcomes import Outcomes as Outcomes
-from .replay.request import ReplayRequest as ReplayRequest
-from .replay.runs import record as record
+from .replay.recordings import record as record
 from .report.page import report_page as report_page
 from .report.page import write_report as write_report
 from .request import EvaluationRequest as EvaluationRequest

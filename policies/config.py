@@ -6,9 +6,6 @@ from typing import TYPE_CHECKING, Any, Literal, TypeVar
 
 from kinarm._fields import Checked
 from kinarm.errors import FROM_ZERO
-from kinarm.errors import NOT_NEGATIVE as NOT_NEGATIVE
-from kinarm.errors import POSITIVE as POSITIVE
-from kinarm.errors import SHARE as SHARE
 from kinarm.problem import PROBLEMS, ReachProblem
 from kinarm.task import RewardWeights
 

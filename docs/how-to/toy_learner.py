@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from kinarm.errors import POSITIVE
 from kinarm.policies import (
     CurvePoint,
     Layer,
@@ -16,7 +17,6 @@ from kinarm.policies import (
     TrainingConfig,
     TrainingState,
 )
-from kinarm.policies.config import POSITIVE
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -221,7 +221,7 @@ SHOWN = 20
 """Rows that are printed."""
 
 
-def _status(request: StatusRequest, command: str) -> None:  # noqa: ARG001
+def _status(request: StatusRequest, _: str) -> None:
     """Print how far an experiment is."""
     from kinarm.evaluation.experiments.study import Study
 

@@ -78,8 +78,8 @@ class Experiment(Checked):
     """A set of trainings: all combinations of entries, problems, choices and seeds.
 
     Fields are named as in a recipe (``step_size``, ``reward.success``), those
-    of a problem by path (``problem.task.start_spread``, ``problem.arm``). With
-    a learner in front (``ars.step_size``), they concern that learner alone.
+    of a problem by path (``problem.task.start_spread``, ``problem.arm``). They
+    concern the learners that have them.
 
     Parameters
     ----------

@@ -106,14 +106,6 @@ def _page(name: str, study: "Study", document: dict[str, Any], curves: str) -> s
     )
 
 
-def _by_problem(study: "Study") -> dict[str, list[Group]]:
-    """Groups of each problem, best first."""
-    found: dict[str, list[Group]] = {}
-    for group in sorted(study.groups(), key=lambda each: -(each.success.value or 0)):
-        found.setdefault(group.config.problem.name, []).append(group)
-    return found
-
-
 def learning_curves(study: "Study") -> "Figure | None":
     """Success during the training, against environment steps and wall time.
 
@@ -122,16 +114,16 @@ def learning_curves(study: "Study") -> "Figure | None":
     """
     from matplotlib.ticker import NullFormatter
 
-    problems = {}
-    for name, groups in _by_problem(study).items():
-        if looked := [group for group in groups if any(run.curve for run in group.runs)]:
-            problems[name] = looked[:LINES]
+    problems: dict[str, list[Group]] = {}
+    for group in sorted(study.groups(), key=lambda each: -(each.success.value or 0)):
+        if any(run.curve for run in group.runs):
+            problems.setdefault(group.config.problem.name, []).append(group)
     if not problems:
         return None
     size = 10.0, 1.2 + 3.2 * len(problems)
     figure, panels = panels_figure(size, len(problems), 2, sharey=True)
     for (problem, groups), row in zip(problems.items(), panels, strict=True):
-        for number, group in enumerate(groups):
+        for number, group in enumerate(groups[:LINES]):
             _draw_curves(row, group, number)
         for axes in row:
             axes.axhline(groups[0].reachable, color="#444444", linestyle=":", lw=1)

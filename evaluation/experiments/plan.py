@@ -2,7 +2,7 @@
 
 import hashlib
 import json
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import product
@@ -17,8 +17,6 @@ from kinarm.policies.config import TrainingConfig
 from kinarm.policies.learners import Learner, find_learner
 from kinarm.policies.recipes import recipe
 from kinarm.problem import ReachProblem
-
-Learners = Mapping[str, Learner[Any, Any]]
 
 CHOSEN = {"seed", "recipe"}
 """Settings that the experiment chooses."""
@@ -93,15 +91,13 @@ def plan(
     choices : sequence of mappings, optional
         Values that vary, by field; those of the experiment by default.
     """
-    names = [entry.learner for entry in experiment.all_entries]
-    learners = {each.name: each for each in map(find_learner, names)}
-    for key in experiment.searched:
-        _concerned(key, learners)
+    learners = [find_learner(entry.learner) for entry in experiment.all_entries]
+    _check_fields((*experiment.fixed, *experiment.grid, *experiment.searched), learners)
     varied = list(_combinations(experiment.grid)) if choices is None else choices
     each = [
         (entry, config, to_plain(config), chosen, entry.seeds or experiment.seeds)
         for entry in experiment.all_entries
-        for config, chosen in _settings(experiment, entry, learners, varied)
+        for config, chosen in _settings(experiment, entry, varied)
     ]
     if (total := sum(seeds for *_, seeds in each)) > MOST_TRAININGS:
         raise InvalidInputError(
@@ -131,45 +127,38 @@ def _combinations(grid: Mapping[str, Any]) -> Iterator[dict[str, Any]]:
 
 
 def _settings(
-    experiment: Experiment, entry: Entry, learners: Learners, varied: Sequence[Mapping[str, Any]]
+    experiment: Experiment, entry: Entry, varied: Sequence[Mapping[str, Any]]
 ) -> Iterator[tuple[TrainingConfig, dict[str, Any]]]:
     """Settings of an entry on all of its problems, and what varies."""
     learner = find_learner(entry.learner)
-    alone = {learner.name: learner}
-    fixed = {
-        **_concerning(experiment.fixed, learner.name, learners),
-        **_concerning(entry.fixed, learner.name, alone),
-    }
+    _check_fields((*entry.fixed, *entry.grid), [learner])
+    fixed = {**_concerning(experiment.fixed, learner), **entry.fixed}
     distinct = {}
     for shared, own in product(varied, _combinations(entry.grid)):
-        choices = _concerning(shared, learner.name, learners)
-        choices |= _concerning(own, learner.name, alone)
+        choices = {**_concerning(shared, learner), **own}
         distinct[repr(sorted(choices.items()))] = choices
     for problem in map(ReachProblem.load, entry.problems or experiment.problems):
         for choices in distinct.values():
             yield _config(entry, problem, {**fixed, **choices}), choices
 
 
-def _concerning(entries: Mapping[str, Any], learner: str, learners: Learners) -> dict[str, Any]:
-    """Entries that concern a learner, without its name."""
-    found = ((_concerned(key, learners), value) for key, value in entries.items())
-    return {paths[learner]: value for paths, value in found if learner in paths}
+def _concerning(entries: Mapping[str, Any], learner: Learner[Any, Any]) -> dict[str, Any]:
+    """Entries of fields that a learner has."""
+    known = _fields(learner)
+    return {key: value for key, value in entries.items() if key.partition(".")[0] in known}
 
 
-def _concerned(key: str, learners: Learners) -> dict[str, str]:
-    """Learners that a field concerns, with its path without them."""
-    owner, _, rest = key.partition(".")
-    asked = {owner: rest} if owner in learners else dict.fromkeys(learners, key)
-    known = {name: init_fields(learners[name].config) for name in asked}
-    found = {
-        name: path
-        for name, path in asked.items()
-        if path.partition(".")[0] in known[name].keys() - CHOSEN
-    }
-    if not found:
-        names = [each for fields in known.values() for each in fields if each not in CHOSEN]
-        raise UnknownNameError("field of a recipe or problem", key, dict.fromkeys(names))
-    return found
+def _check_fields(keys: Iterable[str], learners: Sequence[Learner[Any, Any]]) -> None:
+    """Refuse a field that none of the learners has."""
+    known = dict.fromkeys(name for learner in learners for name in _fields(learner))
+    for key in keys:
+        if key.partition(".")[0] not in known:
+            raise UnknownNameError("field of a recipe or problem", key, known)
+
+
+def _fields(learner: Learner[Any, Any]) -> list[str]:
+    """Fields of a learner's settings, but those that the experiment chooses."""
+    return [name for name in init_fields(learner.config) if name not in CHOSEN]
 
 
 def _config(entry: Entry, problem: ReachProblem, entries: Mapping[str, Any]) -> TrainingConfig:

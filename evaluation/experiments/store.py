@@ -44,7 +44,7 @@ class Store:
         return self.folder / kind / f"{run.key}{suffix}"
 
     @contextmanager
-    def writing(self, experiment: Experiment) -> Iterator["Store"]:
+    def writing(self, experiment: Experiment) -> Iterator[None]:
         """Claim the folder for an experiment and keep other writers out.
 
         Raises InvalidInputError if it is the folder of another experiment, and OutputError if it
@@ -56,7 +56,7 @@ class Store:
             for kind in FOLDERS:
                 check_folder(self.folder / kind)
             write_text(self.folder / SPECIFICATION, tomli_w.dumps(experiment.to_json()))
-            yield self
+            yield
 
     def check(self, experiment: Experiment) -> None:
         """Refuse the folder of another experiment."""

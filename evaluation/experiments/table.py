@@ -69,9 +69,9 @@ class Group:
     @cached_property
     def difference(self) -> Estimate:
         """Success less that of the first group, in the same trials; unknown of the first itself."""
-        return (
-            Estimate(None) if self.first is None else share_difference(self.hits, self.first.hits)
-        )
+        if self.first is None:
+            return Estimate(None)
+        return share_difference(self.hits, self.first.hits)
 
     @cached_property
     def reachable(self) -> float:
@@ -177,18 +177,6 @@ def _estimates(group: Group) -> dict[str, Estimate]:
     return {**known, "success": group.success}
 
 
-def _difference_column() -> Column[Group]:
-    """The column of the difference to the first group."""
-    meaning = "success less that of the first trainings of the problem, in the same trials"
-    return Column(
-        "less first %",
-        lambda group: difference_cell("success", group.difference),
-        "difference",
-        meaning,
-        priority=9.5,
-    )
-
-
 def _until_column(level: float) -> Column[Group]:
     """Environment steps [thousands] and processor time [min] to a success level."""
     name = f"until_{100 * level:.0f}"
@@ -209,10 +197,7 @@ def _number_column(
     """The column of a number, which is shown per a unit."""
     digits = 1 if heading.endswith("%") else 2
     return Column(
-        heading,
-        lambda group: f"{value(group) / per:.{digits}f}",
-        name,
-        priority=priority,
+        heading, lambda group: f"{value(group) / per:.{digits}f}", name, priority=priority
     )
 
 
@@ -220,7 +205,13 @@ COLUMNS: tuple[Column[Group], ...] = (
     Column("trainings", attrgetter("label"), priority=ALWAYS, words=True),
     Column("seeds", lambda group: len(group.runs), priority=SEEDS_PRIORITY),
     *(metric_column(name, _estimates) for name in FIGURES[:1]),
-    _difference_column(),
+    Column(
+        "less first %",
+        lambda group: difference_cell("success", group.difference),
+        "difference",
+        "success less that of the first trainings of the problem, in the same trials",
+        priority=9.5,
+    ),
     *(metric_column(name, _estimates) for name in FIGURES[1:]),
     _number_column("worst seed %", "worst_seed", attrgetter("worst_seed"), 0.01, 10.5),
     _number_column("million steps", "environment_steps", attrgetter("environment_steps"), 1e6, 9),

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Any
 
 from kinarm.errors import InvalidInputError, KinarmError
 from kinarm.evaluation.contestants import Contestant
-from kinarm.evaluation.replay.choosing import named_contestants
+from kinarm.evaluation.replay.recordings import named_contestants
 from kinarm.evaluation.trials import TrialSet
 from kinarm.policies.export import contract_of
 from kinarm.policies.policy import Policy
@@ -15,7 +15,7 @@ from kinarm.viewer.playground import play_page
 from kinarm.world import World
 
 if TYPE_CHECKING:
-    from kinarm.evaluation.replay.request import ReplayRequest
+    from kinarm.evaluation.commands.replay import ReplayRequest
 
 PLAYED = ("ppo-best-both", "ppo-best-hard-paper", "ars-linear-both", "ars-paper-both")
 """Policies that a playground has by default."""

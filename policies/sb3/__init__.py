@@ -4,8 +4,8 @@ import tomllib
 from dataclasses import dataclass, field
 from typing import Any
 
-from kinarm.errors import InvalidInputError, UnknownNameError
-from kinarm.policies.config import MANY, NOT_NEGATIVE, POSITIVE, Schedule, TrainingConfig
+from kinarm.errors import NOT_NEGATIVE, POSITIVE, InvalidInputError, UnknownNameError
+from kinarm.policies.config import MANY, Schedule, TrainingConfig
 from kinarm.policies.learners import Learner, TrainingState, imported
 from kinarm.policies.recipes import shipped_learner
 

@@ -6,10 +6,10 @@ import pytest
 
 from kinarm.evaluation import EvaluationRequest
 from kinarm.evaluation.commands.bench import BenchmarkRequest
+from kinarm.evaluation.commands.replay import ReplayRequest
 from kinarm.evaluation.commands.reproduce import ReproductionRequest
 from kinarm.evaluation.commands.study import StudyRequest
 from kinarm.evaluation.commands.train import SeedsRequest
-from kinarm.evaluation.replay.request import ReplayRequest
 from kinarm.policies.training import TrainRequest
 from kinarm.problem import PROBLEMS
 

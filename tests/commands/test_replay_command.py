@@ -9,7 +9,7 @@ from refusals import check_refused
 from kinarm.evaluation.replay.playground import PLAYED
 from kinarm.policies.library import best_policy
 from kinarm.problem import ReachProblem
-from kinarm.recording import load_recordings
+from kinarm.recording import load_recordings, save_recordings
 
 QUICK = ("--no-oracle",)
 EVALUATED = ("--problem", "right", "--trials", 12, "--seed", 4)
@@ -106,10 +106,12 @@ def test_a_page_of_kinarm_with_the_default_name_is_replaced(run, tmp_path, monke
     check_refused(run("kinarm-replay", *options), "--overwrite")
 
 
-def test_recordings_do_not_hold_it(replay, recordings):
-    check_refused(replay(recordings, "--policy", "nobody"), "'nobody'", "mine-seed0")
-    check_refused(replay(recordings, "--problem", "left"), "holds no recording")
+def test_a_file_of_recordings_says_by_whom_they_are(replay, recordings, tmp_path):
+    check_refused(replay(recordings, "--policy", "zero"), "--policy", "a file of recordings")
+    check_refused(replay(recordings, "--problem", "left"), "--problem", "a file of recordings")
     check_refused(replay(recordings, "--trial", 9), "no trial 9", "0 to 3")
+    save_recordings(tmp_path / "empty.npz", [])
+    check_refused(replay(tmp_path / "empty.npz"), "empty.npz", "holds no recording")
 
 
 class TestPlayground:

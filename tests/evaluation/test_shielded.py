@@ -5,8 +5,8 @@ import pytest
 
 from kinarm import PROBLEMS, ReachProblem, Simulator
 from kinarm.evaluation import EvaluationRequest, ReplayRequest, evaluate
+from kinarm.evaluation.commands.replay import described
 from kinarm.evaluation.finding import find_contestants
-from kinarm.evaluation.replay.request import described
 from kinarm.evaluation.selection import group_names
 from kinarm.policies import Policy, PPOConfig, load_policy, train_policy
 from kinarm.recording import load_recordings, record_rollouts, save_recordings

@@ -1,23 +1,25 @@
-"""Trials to replay: new ones, or recordings of a file."""
+"""Recordings to replay: of trials that are run now, or of a file."""
 
 from collections import Counter
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, NamedTuple
 
-from kinarm.errors import InvalidInputError, UnknownNameError
+from kinarm._fields import to_plain
+from kinarm.errors import InvalidInputError
 from kinarm.evaluation.bounds import oracle_bounds
 from kinarm.evaluation.contestants import ORACLE, Contestant
 from kinarm.evaluation.finding import check_normalizing, find_contestants
 from kinarm.evaluation.outcomes import failure_causes
-from kinarm.evaluation.replay.runs import record
 from kinarm.evaluation.trials import TrialSet
-from kinarm.policies.library import BEST, group_of
+from kinarm.policies.library import BEST
+from kinarm.policies.oracle.solutions import OracleSolutions
+from kinarm.policies.provenance import package_versions, source_commit
 from kinarm.problem import ReachProblem
-from kinarm.recording import Recording, load_recordings
+from kinarm.recording import Recording, load_recordings, record_rollouts
 
 if TYPE_CHECKING:
-    from kinarm.evaluation.replay.request import ReplayRequest
+    from kinarm.evaluation.commands.replay import ReplayRequest
 
 PLAYED, SEARCHED, FAILING = 5, 200, 10_000
 """Default numbers of trials: to play, to choose from, to look for failures in."""
@@ -29,12 +31,62 @@ Trial = tuple[Recording, ...]
 """One trial as run by one policy, or by two."""
 
 
+def record(
+    contestant: Contestant,
+    trials: TrialSet,
+    numbers: Sequence[int] | None = None,
+    *,
+    bounds: OracleSolutions | None = None,
+    allow_other_arm: bool = False,
+) -> list[Recording]:
+    """Run a contestant on trials and record its motions.
+
+    Parameters
+    ----------
+    contestant : Contestant
+        The policy, baseline or oracle.
+    trials : TrialSet
+        The trials that it faces.
+    numbers : sequence of int, optional
+        Trials to keep, in this order; all by default.
+    bounds : OracleSolutions, optional
+        The oracle's bounds of the trials, or of the first ones.
+    allow_other_arm : bool
+        Whether a policy may face an arm that it was not trained for.
+
+    Raises
+    ------
+    InvalidInputError
+        If there is no trial of such a number.
+    PolicyFileError
+        If the policy was trained for another arm, which is not allowed.
+    """
+    simulator = trials.simulator
+    contestant.check(simulator.problem, simulator.arm, allow_other_arm=allow_other_arm)
+    rollouts = contestant.run(trials, record=True)
+    made = to_plain(contestant.policy.provenance) if contestant.policy else None
+    known = [] if bounds is None else bounds.steps_lower_bound.tolist()
+    return record_rollouts(
+        trials.simulator,
+        rollouts,
+        contestant.name,
+        numbers,
+        steps_lower_bound=dict(enumerate(known)).get,
+        provenance={
+            "trial_seed": trials.seed,
+            "policy": made,
+            "versions": package_versions(),
+            "commit": source_commit(),
+            **({"note": note} if (note := contestant.note_on(trials.problem)) else {}),
+        },
+    )
+
+
 @dataclass(frozen=True)
 class Candidates:
-    """Trials to choose from, how many are played by default, and their set."""
+    """Trials to choose from, and their set if they are run now."""
 
     trials: list[Trial]
-    played: int
     faced: TrialSet | None = None
 
 
@@ -67,34 +119,27 @@ def chosen_recordings(request: "ReplayRequest") -> Chosen:
     elif request.worst is not None:
         chosen = _worst(trials, request.worst)
     else:
-        chosen = trials[: candidates.played]
+        chosen = trials
     return Chosen(_with_bounds(candidates, chosen, oracle=request.oracle))
 
 
 def _find_candidates(request: "ReplayRequest") -> Candidates:
     """Make or read the recordings to choose from."""
-    default = BEST if request.failures and request.source is None else None
-    names = request.compare or (request.policy or default,)
     if request.source is None:
-        return _fresh_candidates(request, names)
-    problem, arm, runs = request.problem, request.arm, []
-    recorded = load_recordings(request.source)
-    found = [each for each in recorded if problem in (None, each.problem.name)]
+        policy = request.policy or (BEST if request.failures else "")
+        if not (policy or request.compare):
+            raise InvalidInputError("name a --policy, or a file of recordings")
+        return _fresh_candidates(request, request.compare or (policy,))
+    found, arm = load_recordings(request.source), request.arm
+    if not found:
+        raise InvalidInputError(f"{str(request.source)!r} holds no recording")
     if arm is not None:  # where their URDF lies now
         moved = (each.problem.replace(arm=replace(each.problem.arm, source=arm)) for each in found)
         found = [replace(each, problem=new) for each, new in zip(found, moved, strict=True)]
-    for name in names:
-        run = [each for each in found if name in (None, each.policy, group_of(each.policy))]
-        if name is not None and not run:
-            raise UnknownNameError("policy", name, dict.fromkeys(each.policy for each in found))
-        runs.append(run)
-    trials = list(zip(*runs, strict=False))
-    if not trials:
-        raise InvalidInputError(f"{str(request.source)!r} holds no recording that fits")
-    return Candidates(trials, len(trials))
+    return Candidates([(each,) for each in found])
 
 
-def _fresh_candidates(request: "ReplayRequest", names: Sequence[str | None]) -> Candidates:
+def _fresh_candidates(request: "ReplayRequest", names: Sequence[str]) -> Candidates:
     """Run policies on trials that are drawn now."""
     contestants, problem = named_contestants(request, names)
     searched = request.trial or request.worst
@@ -102,20 +147,22 @@ def _fresh_candidates(request: "ReplayRequest", names: Sequence[str | None]) -> 
     trials = TrialSet.draw(problem, count, request.seed or 0)
     other = request.allow_other_arm
     runs = [record(contestant, trials, allow_other_arm=other) for contestant in contestants]
-    return Candidates(list(zip(*runs, strict=True)), count, trials)
+    return Candidates(list(zip(*runs, strict=True)), trials)
 
 
 def named_contestants(
-    request: "ReplayRequest", names: Sequence[str | None]
+    request: "ReplayRequest", names: Sequence[str]
 ) -> tuple[list[Contestant], ReachProblem]:
-    """The contestants of names, and the problem that they face.
+    """The contestants of names, of groups the first seeds, and the problem that they face.
 
     The request names it (for the best policy, the usual one by default), or
     changes that of the first trained contestant.
     """
     named = request.problem is not None or request.task is not None
     stated = request.resolve() if named or BEST in names else None
-    contestants = [_first_contestant(name, stated, request) for name in names]
+    contestants = [
+        find_contestants(name, stated, request.vec_normalize, request.wrapper)[0] for name in names
+    ]
     check_normalizing(contestants, request.vec_normalize)
     if request.shield:
         contestants = [each.shielded() for each in contestants]
@@ -125,15 +172,6 @@ def named_contestants(
     if not trained:
         raise InvalidInputError(f"{contestants[0].name!r} was not trained: name a --problem")
     return contestants, request.resolve(trained[0])
-
-
-def _first_contestant(
-    name: str | None, problem: ReachProblem | None, request: "ReplayRequest"
-) -> Contestant:
-    """The contestant of a name, of a group the first seed."""
-    if name is None:
-        raise InvalidInputError("name a --policy, or a file of recordings")
-    return find_contestants(name, problem, request.vec_normalize, request.wrapper)[0]
 
 
 def _with_bounds(
