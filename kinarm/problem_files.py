@@ -32,8 +32,8 @@ def read_problem(path: Path) -> dict[str, Any]:
     """Read a problem file, as a table of what differs from the defaults.
 
     Parts are tables; ``arm`` and ``scene`` may also be names or files, and ``task`` those of
-    another problem, which stay. The problem ``base`` has the rest. By default all goal regions of another
-    scene are to be reached.
+    another problem, which stay. The problem ``base`` has the rest. By default all goal regions of
+    another scene are to be reached.
     """
     entries = read_toml(path, "problem")
     regions = PAPER_TASKS[take_base(entries, str(path), PAPER_TASKS, "right")]
