@@ -7,7 +7,6 @@ import numpy as np
 from numpy.typing import DTypeLike
 
 from kinarm.envs.environment import ArmEnvironment, Array, Observations, one_by_one
-from kinarm.envs.extra import ExtraObservation
 from kinarm.episodes import COLLISION, RUNNING, SUCCESS, TRUNCATED, Episodes
 from kinarm.errors import finite_array
 from kinarm.problem import ProblemLike
@@ -34,8 +33,6 @@ class ReachEnv(ArmEnvironment, gymnasium.Env[Any, Array]):
         Where pictures are taken from.
     observation_dtype : {"float64", "float32"}
         Type of observations.
-    extra_observation : kinarm.ExtraObservation, optional
-        Further entries, computed in Python.
     **overrides
         What `kinarm.ReachProblem.replace` takes, such as ``arm``,
         ``tolerance``, ``horizon``, ``start_spread``, or ``reward={"success":
@@ -96,11 +93,10 @@ class ReachEnv(ArmEnvironment, gymnasium.Env[Any, Array]):
         height: int = 360,
         camera: Any = None,
         observation_dtype: DTypeLike = np.float64,
-        extra_observation: ExtraObservation | None = None,
         **overrides: Any,
     ) -> None:
         picture = {"width": width, "height": height, "camera": camera}
-        settings = overrides, observation_dtype, extra_observation, render_mode
+        settings = overrides, observation_dtype, render_mode
         self._set_up(problem, 1, 1, *settings, **picture)
         self.observation_space = self.interface.observation_space
         self.action_space = self.interface.action_space
@@ -109,7 +105,6 @@ class ReachEnv(ArmEnvironment, gymnasium.Env[Any, Array]):
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Observations, dict[str, Any]]:
         """Begin an episode; ``options`` may set ``start`` and ``goal``."""
-        self._check_open()
         super().reset(seed=seed)
         if self._episodes is None or seed is not None:
             self._queues.seed(0, self.np_random)
@@ -152,12 +147,11 @@ class ReachEnv(ArmEnvironment, gymnasium.Env[Any, Array]):
         return np.array(self.episodes.q[0])
 
     def close(self) -> None:
-        """Close the live page, if any; nothing can be done afterwards."""
-        self.closed = True
+        """Close the live page, if any."""
         self._pictures.close()
 
     def _observation(self, episode: Episodes) -> Observations:
-        return one_by_one(self.interface.show(episode), 1)[0]
+        return one_by_one(self.interface.observe(episode.observation), 1)[0]
 
     def _info(self, episode: Episodes, result: StepResult) -> dict[str, Any]:
         told = dict(zip(self._told, result.numbers[1:, 0].tolist(), strict=False))

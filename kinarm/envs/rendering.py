@@ -28,21 +28,6 @@ FULL_SIZE = 4
 """Largest number of arms with full-size pictures; more share their area."""
 
 
-class Pictures(tuple[Picture, ...]):
-    """Pictures of all arms, of one size, as in Gymnasium."""
-
-    @property
-    def tiled(self) -> Picture:
-        """All in one picture, row by row; empty tiles are white."""
-        height, width = self[0].shape[:2]
-        columns = math.ceil(math.sqrt(len(self)))
-        rows = math.ceil(len(self) / columns)
-        sheet = np.full((rows, height, columns, width, 3), 255, dtype=np.uint8)
-        for number, picture in enumerate(self):
-            sheet[number // columns, :, number % columns] = picture
-        return sheet.reshape(rows * height, columns * width, 3)
-
-
 class EnvPictures:
     """Pictures of the arms of an environment.
 
@@ -133,7 +118,7 @@ class EnvPictures:
             self._stage.server.close()
         self._stage, self._renderers = None, {}
 
-    def render(self) -> Pictures | None:
+    def render(self) -> tuple[Picture, ...] | None:
         """A picture of each arm, in the mode for it."""
         if self.mode != "rgb_array":
             return None
@@ -144,7 +129,7 @@ class EnvPictures:
             time = self._begun.steps[row] * self._simulator.problem.stepping.time_step
             shown = {"trace": trace, "outcome": outcome, "contact": contact, "time": time}
             pictures.append(render(q, goal, **shown))
-        return Pictures(pictures)
+        return tuple(pictures)
 
     def _renderer(self, row: int) -> "Renderer":
         """Renderer of an arm's scene, one for all arms if they have the same."""

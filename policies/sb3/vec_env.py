@@ -103,7 +103,6 @@ class SB3VecEnv(Lifecycle, VecEnv):
 
     def reset(self) -> Observations:
         """Begin all episodes anew, with the seeds and options set before."""
-        self._check_open()
         for row, seed in enumerate(self._seeds):
             if seed is not None:
                 self._queues.seed(row, np.random.default_rng(seed))
@@ -120,7 +119,7 @@ class SB3VecEnv(Lifecycle, VecEnv):
         self._episodes = episodes = self.simulator.reset(starts, goals)
         self._starts[:], self._returns[:] = episodes.q, 0.0
         self._announce(episodes, np.arange(self.num_envs))
-        return self.interface.show(episodes)
+        return self.interface.observe(episodes.observation)
 
     def set_options(self, options: Any = None) -> None:
         """Set ``start`` and ``goal`` of the next reset.
@@ -182,7 +181,7 @@ class SB3VecEnv(Lifecycle, VecEnv):
             }
             if self._share:
                 columns["replayed"] = self._replayed
-            finals = one_by_one(self.interface.show(episodes, ended), ended.size)
+            finals = one_by_one(self.interface.observe(episodes.observation[ended]), ended.size)
             elapsed = round(time.time() - self._made, 6)
             for row, final in zip(ended.tolist(), finals, strict=True):
                 total, length = self._returns[row].item(), episodes.steps[row].item()
@@ -193,7 +192,7 @@ class SB3VecEnv(Lifecycle, VecEnv):
                     "episode": {"r": total, "l": length, "t": elapsed},
                 }
             self._renew(episodes, ended)
-        observations = self.interface.show(episodes)
+        observations = self.interface.observe(episodes.observation)
         return observations, reward.astype(np.float32), dones, infos
 
     def _renew(self, episodes: Episodes, rows: NDArray[np.int64]) -> None:
@@ -211,10 +210,8 @@ class SB3VecEnv(Lifecycle, VecEnv):
     def render(self, mode: str | None = None) -> Any:
         """Draw all arms side by side; see `kinarm.ReachVectorEnv`."""
         _ = self.episodes  # refuses if there are none
-        if self.render_mode is None or mode not in (None, self.render_mode):
-            return super().render(mode)
-        shown = self._pictures.render()
-        return shown and shown.tiled
+        live = self.render_mode == "human" and mode in (None, "human")
+        return None if live else super().render(mode)
 
     def get_images(self) -> list[NDArray[np.uint8] | None]:
         """One picture of each arm, shape (height, width, 3), for ``rgb_array``."""

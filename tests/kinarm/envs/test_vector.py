@@ -229,7 +229,7 @@ class TestOptions:
     ("settings", "message"),
     [
         ({"num_envs": 0}, "num_envs must be a whole number of at least 1"),
-        ({"horizons": 3}, "unexpected keyword argument 'horizons'; available"),
+        ({"horizons": 3}, "unknown setting of a problem"),
     ],
 )
 def test_bad_settings_are_refused(settings, message):
