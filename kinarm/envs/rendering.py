@@ -11,7 +11,7 @@ from kinarm.episode_scenes import scene_of_episode
 from kinarm.episodes import COLLISION, SUCCESS, TRUNCATED, Episodes
 from kinarm.errors import InvalidInputError, whole_number
 from kinarm.simulator import Simulator
-from kinarm.viewer.camera import Camera, CameraLike
+from kinarm.viewer.camera import Camera
 
 if TYPE_CHECKING:
     from kinarm.collision import Contact
@@ -55,7 +55,7 @@ class EnvPictures:
         *,
         width: int = 480,
         height: int = 360,
-        camera: CameraLike | None = None,
+        camera: Camera | None = None,
     ) -> None:
         if mode is not None and mode not in RENDER_MODES:
             raise InvalidInputError(
@@ -66,7 +66,9 @@ class EnvPictures:
         sides = {"width": width, "height": height}.items()
         wanted = [whole_number(name, pixels, 1) for name, pixels in sides]
         self._size = [max(round(pixels * share), 1) for pixels in wanted]
-        self._camera = None if camera is None else Camera.checked(camera)
+        if camera is not None and not isinstance(camera, Camera):
+            raise InvalidInputError(f"camera must be a kinarm.viewer.Camera, got {camera!r}")
+        self._camera = camera
         self.mode = mode
         self._simulator, self._num_envs = simulator, num_envs
         self._traces = np.empty((num_envs if mode else 0, simulator.task.horizon + 1, 3))
