@@ -154,8 +154,7 @@ def is_symmetric(problem: ReachProblem) -> bool:
 def _rests_are_symmetric(goal: GoalSpecification) -> bool:
     """Whether the reflection surely maps what goals have beside a position to itself."""
     turned = {(-roll, pitch, -yaw) for roll, pitch, yaw in goal.rotations}
-    level = goal.axis is None or goal.axis[1] == 0
-    return level and turned == set(goal.rotations) and not goal.configurations
+    return turned == set(goal.rotations) and not goal.configurations
 
 
 def _outline(body: Body, signs: Point = (1.0, 1.0, 1.0)) -> tuple[Any, ...]:
