@@ -175,20 +175,16 @@ def test_boxes_are_turned():
     assert volume(body) > 0
 
 
-def test_corners_are_kept_to_a_65534th_of_the_size(recordings):
-    """On a grid along the longest side, which the page scales back."""
-    vertices = []
+def test_corners_are_where_the_parts_of_the_arm_have_them(recordings):
+    """In single precision."""
+    drawn = []
     for command in commands(replay_page(recordings)):
         if command.get("path", "").startswith("/meshcat/arm") and "object" in command:
-            described = command["object"]
-            positions = described["geometries"][0]["data"]["attributes"]["position"]["array"].data
-            matrix = np.array(described["object"]["matrix"]).reshape(4, 4).T
-            vertices.append(np.frombuffer(positions, "<i2").reshape(-1, 3) @ matrix[:3, :3].T)
-            vertices[-1] = vertices[-1] + matrix[:3, 3]
+            (shape,) = command["object"]["geometries"]
+            positions = shape["data"]["attributes"]["position"]["array"].data
+            drawn.append(np.frombuffer(positions, "<f4").reshape(-1, 3))
     by_joint = {}
     for part in arm_parts(Arm.load("paper")):
         by_joint.setdefault((part.joint, part.finish), []).append(part.mesh)
-    assert len(vertices) == len(by_joint)
-    for drawn, meshes in zip(vertices, by_joint.values(), strict=True):
-        exact = Mesh.joined(meshes).vertices
-        np.testing.assert_allclose(drawn, exact, atol=np.ptp(exact, axis=0).max() / 65534)
+    for vertices, meshes in zip(drawn, by_joint.values(), strict=True):
+        np.testing.assert_allclose(vertices, Mesh.joined(meshes).vertices, atol=1e-6)
