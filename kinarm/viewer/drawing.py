@@ -3,7 +3,7 @@
 import struct
 import threading
 from collections import defaultdict
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import replace
 from itertools import count
 from typing import Any
@@ -65,8 +65,7 @@ class DrawnScene:
     def __init__(self) -> None:
         self.window, self.ids = Visualizer(window=self), count()
         self._commands: dict[tuple[str, str, str], tuple[int, bytes]] = {}
-        self._last, self._closed = 0, False
-        self._changed = threading.Condition()
+        self._last, self._lock = 0, threading.Lock()
 
     def send(self, command: Any) -> None:
         """Take a command; Meshcat calls this."""
@@ -77,38 +76,24 @@ class DrawnScene:
         path, kind, packed = command["path"], command["type"], umsgpack.packb(command)
         key = (path, kind, command.get("property", ""))
         below = f"{path.rstrip('/')}/"
-        with self._changed:
+        with self._lock:
             for other in [*self._commands] if kind == "delete" else ():
                 if other[0] == path or other[0].startswith(below):
                     del self._commands[other]
             self._commands.pop(key, None)  # so that the latest commands come last
             self._last += 1
             self._commands[key] = self._last, struct.pack("<I", len(packed)) + packed
-            self._changed.notify_all()
 
     @property
     def content(self) -> bytes:
         """All commands that count."""
         return b"".join(told for _, told in self._commands.values())
 
-    def close(self) -> None:
-        """End all `changes`."""
-        with self._changed:
-            self._closed = True
-            self._changed.notify_all()
-
-    def changes(self) -> Iterator[bytes]:
-        """All commands that count, then new ones, until the scene is closed."""
-        seen = 0
-        while True:
-            with self._changed:
-                while not self._closed and self._last == seen:
-                    self._changed.wait()
-                if self._closed:
-                    return
-                news = [told for number, told in self._commands.values() if number > seen]
-                seen = self._last
-            yield from news
+    def news(self, since: int) -> bytes:
+        """How many commands there were, and those that count of what came after so many."""
+        with self._lock:
+            told = [told for number, told in self._commands.values() if number > since]
+            return struct.pack("<I", self._last) + b"".join(told)
 
 
 class _Described(geometry.Object):
