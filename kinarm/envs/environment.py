@@ -30,6 +30,10 @@ Outcome = tuple[Array, NDArray[np.bool_], NDArray[np.bool_]]
 DTYPES = ("float64", "float32")
 
 
+class UnexpectedArgumentError(InvalidInputError, TypeError):
+    """An argument that environments do not have, which libraries try: TorchRL heeds TypeErrors."""
+
+
 class Interface:
     """How an environment shows its simulator: its observation and reward.
 
@@ -146,7 +150,14 @@ class ArmEnvironment(Lifecycle):
         **picture: Any,
     ) -> None:
         """Build simulator and interface by the settings of `ReachEnv`."""
-        changed = ReachProblem.load(problem).replace(**overrides)
+        try:
+            changed = ReachProblem.load(problem).replace(**overrides)
+        except UnknownNameError as error:
+            if error.given not in overrides:
+                raise
+            raise UnexpectedArgumentError(
+                f"unexpected keyword argument {error.given!r}: {error}"
+            ) from error
         self.simulator = simulator = Simulator(changed, threads=threads)
         self.render_mode = render_mode
         self.interface = self._make_interface(simulator, dtype)

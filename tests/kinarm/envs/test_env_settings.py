@@ -103,7 +103,7 @@ class TestSettings:
         ("settings", "error", "message"),
         [
             ({"problem": "up"}, UnknownNameError, "'up'"),
-            ({"horizons": 3}, UnknownNameError, "'horizons'"),
+            ({"horizons": 3}, TypeError, "keyword argument 'horizons': .* available"),
             ({"reward": {"collision": 1}}, ProblemError, "rewards contact"),
             ({"horizon": 0}, InvalidInputError, "horizon"),
             ({"observation_dtype": "int8"}, InvalidInputError, "observation_dtype must be one of"),
