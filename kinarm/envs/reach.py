@@ -7,8 +7,8 @@ import numpy as np
 from numpy.typing import DTypeLike
 
 from kinarm.envs.environment import ArmEnvironment, Array, Observations, one_by_one
-from kinarm.episodes import COLLISION, RUNNING, SUCCESS, TRUNCATED, Episodes
-from kinarm.errors import finite_array
+from kinarm.episodes import RUNNING, Episodes
+from kinarm.errors import InvalidInputError, finite_array
 from kinarm.problem import ProblemLike
 from kinarm.step_result import StepResult
 
@@ -72,8 +72,7 @@ class ReachEnv(ArmEnvironment, gymnasium.Env[Any, Array]):
 
     **End**: terminated when the tool is within 0.05 m of the goal, or when a
     move would touch the ground, an obstacle or the arm itself (the move is
-    refused); truncated after 64 steps. Then nothing moves until `reset`: steps
-    have the reward 0, and Gymnasium warns.
+    refused); truncated after 64 steps. A step after the end is an error.
 
     **Info**: ``distance`` [m]; ``configuration``, the joint positions [rad or
     m], as the attribute of that name has them; and after a step ``success``
@@ -115,24 +114,17 @@ class ReachEnv(ArmEnvironment, gymnasium.Env[Any, Array]):
     def step(self, action: Array) -> tuple[Observations, float, bool, bool, dict[str, Any]]:
         """Move for one time step."""
         episode = self.episodes
-        over = episode.status.item() != RUNNING
+        if episode.status.item() != RUNNING:
+            raise InvalidInputError("the episode is over: call reset() first")
         try:
             result = self.simulator.step(episode, np.asarray(action)[None])
         except ValueError:  # of the simulator, or of NumPy
             finite_array("action", action, (self.simulator.n_actions,))
             raise
-        if over:  # tell of the end again
-            gymnasium.logger.warn(
-                "step() was called although the episode is over: call reset() first. "
-                "Nothing moves until then, and rewards are 0."
-            )
-            status = episode.status
-            result.flags[:] = np.equal.outer((TRUNCATED, SUCCESS, COLLISION), status)
-            result.contact[:] = episode.touched * (status == COLLISION)
         reward, terminated, truncated = self.interface.step_outcome(episode, result)
         self._find_contacts(episode, result)
         self._pictures.step(episode)
-        answer = 0.0 if over else reward.item(), terminated.item(), truncated.item()
+        answer = reward.item(), terminated.item(), truncated.item()
         return self._observation(episode), *answer, self._info(episode, result)
 
     def render(self) -> Any:

@@ -118,17 +118,12 @@ class TestEpisode:
         assert not truncated
         assert not info["success"]
 
-    def test_nothing_moves_after_the_end(self, env):
-        """As Gymnasium's CartPole: a warning, the same flags, no reward."""
+    def test_step_after_the_end_is_refused(self, env):
         goal = env.simulator.arm.tool_position([math.radians(7), 0, 0, 0, 0, 0])
         env.reset(options={"start": HOME, "goal": goal})
-        over = env.step([1, 0, 0, 0, 0])
-        with pytest.warns(UserWarning, match="the episode is over"):
-            again = env.step([-1, 0, 0, 0, 0])
-        np.testing.assert_array_equal(again[0], over[0])
-        assert again[1:4] == (0.0, True, False)
-        assert again[4]["is_success"]
-        assert again[4]["distance"] == over[4]["distance"]
+        assert env.step([1, 0, 0, 0, 0])[2]
+        with pytest.raises(InvalidInputError, match="the episode is over"):
+            env.step([-1, 0, 0, 0, 0])
 
 
 class TestSeeding:
