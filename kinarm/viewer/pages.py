@@ -165,11 +165,7 @@ def _check_recordings(recordings: Sequence[Recording], ghosts: Sequence[Recordin
             )
         if problem.scene != first.scene:
             raise InvalidInputError("the recordings were made in different scenes")
-    if ghosts and len(ghosts) != len(recordings):
-        raise InvalidInputError(
-            f"there must be a ghost for each recording: {len(ghosts)} for {len(recordings)}"
-        )
-    for recording, ghost in zip(recordings, ghosts, strict=False):
+    for recording, ghost in zip(recordings, ghosts, strict=bool(ghosts)):
         if not recording.same_trial(ghost):
             raise InvalidInputError(
                 f"trial {recording.trial} of {recording.policy!r} and trial {ghost.trial} of "
