@@ -8,7 +8,6 @@ from .bodies import HeldBody as HeldBody
 from .bodies import RandomBodies as RandomBodies
 from .body_motion import BodyMotion as BodyMotion
 from .collision import Contact as Contact
-from .envs import ExtraObservation as ExtraObservation
 from .envs import ReachEnv as ReachEnv
 from .envs import ReachGoalEnv as ReachGoalEnv
 from .envs import ReachGoalVectorEnv as ReachGoalVectorEnv
@@ -55,7 +54,6 @@ from .task import REWARD_TERMS as REWARD_TERMS
 from .task import ReachTask as ReachTask
 from .task import RewardWeights as RewardWeights
 from .task import Stepping as Stepping
-from .viewer import ReplayPage as ReplayPage
 from .world import World as World
 
 SEMANTICS: str

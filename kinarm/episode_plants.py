@@ -5,7 +5,7 @@ import numpy as np
 from kinarm._parallel import run_rows
 from kinarm.episode_scenes import bits_of
 from kinarm.kernels.compiling import Array
-from kinarm.kernels.plant import CHANGE, FORMER, OFFSETS, VELOCITY, draw_plants, plant_width
+from kinarm.kernels.plant import FORMER, OFFSETS, VELOCITY, draw_plants, plant_width
 from kinarm.plant import PlantDraws
 from kinarm.problem import ReachProblem
 
@@ -47,5 +47,5 @@ class EpisodePlants:
         calibration = plants[:, OFFSETS + self._n_actions : OFFSETS + 2 * self._n_actions]
         commands = q[:, : self._n_actions] - calibration
         drive = np.repeat(commands[:, None], self.rows, axis=1)
-        drive[:, VELOCITY : CHANGE + 1] = 0.0
+        drive[:, VELOCITY] = 0.0
         return drive

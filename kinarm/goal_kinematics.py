@@ -1,6 +1,5 @@
 """What goals mean for an arm: where they lie, and which configurations reach them."""
 
-import math
 from functools import cached_property
 from typing import Any
 
@@ -13,7 +12,7 @@ from kinarm.chain import within_limits
 from kinarm.collision import ContactModel
 from kinarm.episodes import Pursuit, Rules
 from kinarm.errors import LARGEST, InvalidInputError, ProblemError, finite_array
-from kinarm.goals import Cone, Goals, quaternion_between, unit
+from kinarm.goals import Goals, unit
 from kinarm.inverse_kinematics import SEEDS, InverseKinematics, approach_axis
 from kinarm.kernels.compiling import Array
 from kinarm.kernels.goals import GoalRules, fill_reached
@@ -68,7 +67,6 @@ class GoalKinematics(InverseKinematics):
             kind=goal.number,
             hold=goal.hold,
             sequence=goal.sequence,
-            wander=goal.wander or 0,
             tolerance=goal.rotation_tolerance,
             stride=float("inf") if goal.speed is None else goal.speed * dt,
             axis=approach_axis(self.arm),
@@ -109,11 +107,6 @@ class GoalKinematics(InverseKinematics):
             none, ends = np.zeros(0, dtype=np.int64), np.arange(1, n) / n
             return Goals(rests[:, :3], np.zeros((n, 0)), none, ends, rests[:, 3:])
         axis = (self.tool[:3, :3] * approach_axis(self.arm)[:, None]).sum(axis=0)
-        if goal.axis is not None:
-            along = unit(np.array(goal.axis))
-            turned = along if goal.kind == "direction" else quaternion_between(axis, along)
-            cone = Cone(along, axis, 1.0 - round(math.cos(goal.angle), 12))
-            return goals.with_rests(turned[None])._replace(cone=cone)
         turns = [rotation_matrix(rpy) for rpy in goal.rotations]
         if goal.kind == "direction":
             listed = [unit((turn * axis).sum(axis=1)) for turn in turns]
@@ -227,7 +220,7 @@ class GoalKinematics(InverseKinematics):
         spec, horizon, (n, width) = self.problem.task.goal, self.problem.task.horizon, goals.shape
         if spec.plain:
             return NO_PURSUIT
-        count = spec.count(horizon)
+        count = spec.count
         kept = (n, horizon + 1, width) if record and count else (0, 0, width)
         return recorded(
             Pursuit(

@@ -28,9 +28,6 @@ REST_PARTS = {
 
 GOAL_RESTS, REST_ERRORS = zip(*REST_PARTS.values(), strict=True)
 
-
-ANGLE = {"must": "lie in [0, pi]", "holds": lambda value: 0 <= value <= math.pi}
-
 Point = tuple[float, float, float]
 Array = NDArray[np.float64]
 
@@ -51,11 +48,6 @@ class GoalSpecification(Checked):
         Rotations of the tool frame, each as likely, as roll, pitch and yaw
         about fixed axes [rad]. By default a rotation is one that inverse
         kinematics finds at the position, free of contact.
-    axis : tuple of float, optional
-        Instead, the tool's axis lies within ``angle`` of this direction, evenly
-        over the cone and turned anyhow about itself.
-    angle : float
-        Half of the cone's opening [rad].
     configurations : tuple
         Configurations to be reached, each as likely, instead of those that
         inverse kinematics finds in the goal regions [rad or m].
@@ -67,8 +59,6 @@ class GoalSpecification(Checked):
         Goals of an episode: after one is reached, the next appears.
     motion : BodyMotion, optional
         How goals move.
-    wander : int, optional
-        Goals walk straight to the next random goal in so many steps, and on.
     """
 
     kind: Literal["position", "direction", "pose", "configuration"] = field(
@@ -76,28 +66,19 @@ class GoalSpecification(Checked):
     )
     rotation_tolerance: float = field(default=0.1, metadata={**OPTIONAL, **POSITIVE})
     rotations: tuple[Point, ...] = field(default=(), metadata=OPTIONAL)
-    axis: Point | None = None
-    angle: float = field(default=0.0, metadata={**OPTIONAL, **ANGLE})
     configurations: tuple[tuple[float, ...], ...] = field(default=(), metadata=OPTIONAL)
     hold: int = field(default=1, metadata=OPTIONAL)
     speed: float | None = field(default=None, metadata=POSITIVE)
     sequence: int = field(default=1, metadata={**OPTIONAL, "at_most": 1000})
     motion: BodyMotion | None = None
-    wander: int | None = None
 
     def __post_init__(self) -> None:
         super().__post_init__()
         turned, listed = self.kind in ("direction", "pose"), self.kind == "configuration"
-        ways = {"motion": self.motion, "wander": self.wander, "sequence > 1": self.sequence > 1}
-        given = [name for name, value in ways.items() if value]
         for wrong, reason in (
-            ((self.rotations or self.axis) and not turned, f"{self.kind} has no rotations or axis"),
-            (self.rotations and self.axis, "has either rotations or an axis"),
-            (self.angle and not self.axis, "needs an axis for its angle"),
-            (self.axis and not any(self.axis), "has an axis of 0, 0, 0"),
+            (self.rotations and not turned, f"{self.kind} has no rotations"),
             (self.configurations and not listed, f"{self.kind} has no configurations"),
-            (listed and (self.motion or self.wander), "configuration does not move"),
-            (self.wander and len(given) > 1, f"has {' or '.join(given)}, not both"),
+            (listed and self.motion, "configuration does not move"),
             (
                 self.sequence > 1 and len(set(self.configurations)) == 1,
                 f"sequence of {self.sequence} needs two configurations or more",
@@ -114,7 +95,7 @@ class GoalSpecification(Checked):
     @property
     def changes(self) -> bool:
         """Whether goals move or follow each other."""
-        return self.sequence > 1 or self.motion is not None or self.wander is not None
+        return self.sequence > 1 or self.motion is not None
 
     @cached_property
     def plain(self) -> bool:
@@ -132,56 +113,10 @@ class GoalSpecification(Checked):
         """Length of a goal."""
         return 3 + (0, 3, 4, n_joints)[self.number]
 
-    def count(self, horizon: int) -> int:
-        """Goals of an episode at most, 0 if it has but one that stands."""
-        if self.wander is not None:
-            return horizon // self.wander + 2
+    @property
+    def count(self) -> int:
+        """Goals of an episode, 0 if it has but one that stands."""
         return self.sequence if self.changes else 0
-
-
-class Cone(NamedTuple):
-    """Directions about an axis.
-
-    Attributes
-    ----------
-    axis, tool_axis : ndarray, shape (3,)
-        Their middle in the world, and the tool's axis in the tool frame.
-    height : float
-        1 less the cosine of the largest angle.
-    """
-
-    axis: Array
-    tool_axis: Array
-    height: float
-
-    def turned(self, rests: Array, uniforms: Array) -> Array:
-        """Tilt directions (n, 3) or quaternions (n, 4) by numbers in [0, 1), shape (n, 2 or 3).
-
-        Quaternions are also turned about the tool's axis.
-        """
-        cosine = 1.0 - self.height * uniforms[:, :1]
-        across = perpendicular(self.axis)
-        beside = np.cross(self.axis, across)
-        about = _on_circle(uniforms[:, 1])
-        hinge = about[:, :1] * across + about[:, 1:] * beside
-        if rests.shape[1] == 3:
-            sine = np.sqrt(np.maximum(1.0 - cosine * cosine, 0.0))
-            tilted: Array = cosine * self.axis + sine * np.cross(hinge, self.axis)
-            return tilted
-        half = np.sqrt((1.0 + cosine) / 2), np.sqrt((1.0 - cosine) / 2)
-        roll = _on_circle(0.5 * uniforms[:, 2])
-        rolled = np.concatenate([roll[:, :1], roll[:, 1:] * self.tool_axis], axis=1)
-        tilt = np.concatenate([half[0], half[1] * hinge], axis=1)
-        return product(product(tilt, rests), rolled)
-
-
-def _on_circle(shares: Array) -> Array:
-    """Cosine and sine of shares of a whole turn, shape (n, 2)."""
-    from kinarm.kernels.goals import circle_points  # loads Numba
-
-    points = np.empty((2, len(shares)))
-    circle_points(np.ascontiguousarray(shares), *points)
-    return points.T
 
 
 class Goals(NamedTuple):
@@ -199,8 +134,6 @@ class Goals(NamedTuple):
         Ends of the regions' shares in [0, 1).
     rests : ndarray, shape (n_regions, n_rest)
         Rests of goals there; NaN where inverse kinematics gives them.
-    cone : Cone, optional
-        What turns the rests.
     """
 
     lower: Array
@@ -208,7 +141,6 @@ class Goals(NamedTuple):
     moving: NDArray[np.int64]
     ends: Array
     rests: Array
-    cone: Cone | None = None
 
     @property
     def solved(self) -> bool:
@@ -218,8 +150,7 @@ class Goals(NamedTuple):
     @property
     def n_uniforms(self) -> int:
         """Numbers that a goal is made of."""
-        turned = 0 if self.cone is None else self.rests.shape[1] - 1
-        return 1 + len(self.moving) + turned + int(self.solved)
+        return 1 + len(self.moving) + int(self.solved)
 
     def draw(self, rng: np.random.Generator, count: int) -> NDArray[np.float64]:
         """Draw goals, shape (count, goal_width), uniform over each region."""
@@ -232,10 +163,7 @@ class Goals(NamedTuple):
         """
         chosen = self.ends.searchsorted(uniforms[:, 0], side="right")
         goals = np.concatenate([self.lower[chosen], self.rests[chosen]], axis=1)
-        end = 1 + len(self.moving)
-        goals[:, self.moving] += uniforms[:, 1:end] * self.extent[chosen]
-        if self.cone is not None:
-            goals[:, 3:] = self.cone.turned(goals[:, 3:], uniforms[:, end:])
+        goals[:, self.moving] += uniforms[:, 1 : 1 + len(self.moving)] * self.extent[chosen]
         return goals
 
     def with_rests(self, rests: Array) -> "Goals":
@@ -248,18 +176,6 @@ class Goals(NamedTuple):
             ends=np.cumsum(np.repeat(shares / k, k))[:-1] if k > 1 else self.ends,
             rests=np.tile(rests, (n, 1)),
         )
-
-
-def product(first: Array, second: Array) -> Array:
-    """Products of quaternions w x y z, shape (..., 4)."""
-    (aw, ax, ay, az), (bw, bx, by, bz) = np.moveaxis(first, -1, 0), np.moveaxis(second, -1, 0)
-    parts = (
-        aw * bw - ax * bx - ay * by - az * bz,
-        aw * bx + ax * bw + ay * bz - az * by,
-        aw * by - ax * bz + ay * bw + az * bx,
-        aw * bz + ax * by - ay * bx + az * bw,
-    )
-    return np.stack(parts, axis=-1)
 
 
 def perpendicular(direction: Array) -> Array:

@@ -39,14 +39,9 @@ class Plant(Checked):
         Natural frequency of the servos [Hz]; 0 for joints that obey at once.
     damping : float or tuple of float
         Their damping ratio; 1 is critical.
-    order : {1, 2}
-        Whether a servo sets the speed, or the acceleration.
     acceleration : float or tuple of float
-        Largest acceleration of a joint [rad/s^2 or m/s^2]. Servos are cut off
-        there; joints without servos brake in time for it.
-    jerk : float or tuple of float
-        Largest rate of the acceleration [rad/s^3 or m/s^3], of joints without
-        servos whose acceleration is limited.
+        Largest acceleration of a joint [rad/s^2 or m/s^2]: servos are cut off
+        there.
     resolution : float or tuple of float
         Steps in which joints are commanded [rad or m].
     noise : float or tuple of float
@@ -69,9 +64,7 @@ class Plant(Checked):
     delay: int | tuple[int, int] = field(default=0, metadata={**OPTIONAL, "at_least": 0})
     bandwidth: Range = field(default=0.0, metadata=SETTING)
     damping: Range = field(default=1.0, metadata=SETTING)
-    order: Literal[1, 2] = field(default=2, metadata=OPTIONAL)
     acceleration: Range = field(default=0.0, metadata=SETTING)
-    jerk: Range = field(default=0.0, metadata=SETTING)
     resolution: Range = field(default=0.0, metadata=SETTING)
     noise: Range = field(default=0.0, metadata=SETTING)
     bias: Range = field(default=0.0, metadata=SETTING)
@@ -86,10 +79,10 @@ class Plant(Checked):
             lower, upper = self.range_of(name)
             if lower > upper:
                 raise ProblemError(f"{name} must be a range from low to high, got {lower}, {upper}")
-            if lower == 0 < upper and name in ("bandwidth", "acceleration", "jerk"):
+            if lower == 0 < upper and name in ("bandwidth", "acceleration"):
                 raise ProblemError(f"a range of {name} starts above 0, which stands for no limit")
-        if self.jerk and (self.bandwidth or not self.acceleration):
-            raise ProblemError("jerk needs a limit of acceleration, and joints without servos")
+        if self.acceleration and not self.bandwidth:
+            raise ProblemError("acceleration is limited in servos: it needs a bandwidth")
         if self.range_of("delay")[1] > LONGEST_DELAY:
             raise ProblemError(f"delay must be at most {LONGEST_DELAY} steps, got {self.delay}")
         if self.range_of("bandwidth")[1] > FASTEST_SERVO:
@@ -106,7 +99,7 @@ class Plant(Checked):
     @property
     def ideal(self) -> bool:
         """Whether joints are where they are told to be, and so seen."""
-        blank = Plant(damping=self.damping, order=self.order)
+        blank = Plant(damping=self.damping)
         return self in (blank, Plant(**{**vars(blank), "feedback": "commanded"}))
 
     def range_of(self, name: str) -> tuple[float, float]:
@@ -118,7 +111,7 @@ class Plant(Checked):
 MOST_NOISE = 3.5
 """Largest noise in standard deviations."""
 
-RANGES = tuple(item.name for item in fields(Plant) if item.name not in ("order", "feedback"))
+RANGES = tuple(item.name for item in fields(Plant) if item.name != "feedback")
 """Names of the settings that an episode draws, in the order of `PlantDraws.ranges`."""
 
 
@@ -138,8 +131,8 @@ class PlantDraws(NamedTuple):
     ----------
     ranges : ndarray, shape (n_ranges, 2)
         Lower and upper ends of `RANGES`.
-    order, longest : int
-        Order of the servos, and largest delay [steps].
+    longest : int
+        Largest delay [steps].
     time_step : float
         Duration of a step [s].
     step_limit : ndarray, shape (n_actuated,)
@@ -147,7 +140,6 @@ class PlantDraws(NamedTuple):
     """
 
     ranges: NDArray[np.float64]
-    order: int
     longest: int
     time_step: float
     step_limit: NDArray[np.float64]
@@ -157,7 +149,6 @@ class PlantDraws(NamedTuple):
         """Flatten a plant, for steps of a duration [s] and moves of at most so much."""
         return cls(
             ranges=np.array([plant.range_of(name) for name in RANGES], dtype=np.float64),
-            order=plant.order,
             longest=int(plant.range_of("delay")[1]),
             time_step=time_step,
             step_limit=step_limit,

@@ -127,7 +127,7 @@ def draw_followers(world: World, starts: Array, goals: Array) -> Array:
         The world, starts, shape (n, n_joints) [rad or m], and first goals, shape (n, goal_width).
     """
     task = world.problem.task
-    drawn = np.repeat(goals[:, None], task.goal.count(task.horizon), axis=1)
+    drawn = np.repeat(goals[:, None], task.goal.count, axis=1)
     bits = bits_of(starts, goals).tolist()
     rngs, scenes = [np.random.default_rng(row) for row in bits], world.scenes_of(starts, goals)
     pending = np.zeros(drawn.shape[:2], dtype=bool)

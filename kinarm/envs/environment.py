@@ -1,20 +1,14 @@
 """The common part of all environments: life, specification, contacts, interface."""
 
-import json
 from collections.abc import Mapping
-from dataclasses import replace
-from enum import Enum
 from functools import cached_property
 from typing import Any
 
-import gymnasium.error
 import numpy as np
-from gymnasium.envs.registration import EnvSpec
 from gymnasium.spaces import Box, Space
 from numpy.typing import DTypeLike, NDArray
 
 from kinarm.chain import within_limits
-from kinarm.envs.extra import ExtraObservation
 from kinarm.envs.rendering import RENDER_MODES, EnvPictures
 from kinarm.episodes import Episodes
 from kinarm.errors import InvalidInputError, UnknownNameError, one_or_many
@@ -34,26 +28,9 @@ Outcome = tuple[Array, NDArray[np.bool_], NDArray[np.bool_]]
 
 DTYPES = ("float64", "float32")
 
-SETTINGS = (
-    *("render_mode", "width", "height", "camera", "observation_dtype", "reward_type"),
-    *("extra_observation", "num_envs", "autoreset_mode", "threads", "vectorization_mode"),
-)
-"""Arguments of environments beside their problem's."""
-
-
-class ResetNeededError(InvalidInputError, gymnasium.error.ResetNeeded):
-    """An environment was used before its first reset."""
-
-
-class ClosedEnvironmentError(InvalidInputError, gymnasium.error.ClosedEnvironmentError):
-    """An environment was used after it was closed."""
-
 
 class UnexpectedArgumentError(InvalidInputError, TypeError):
-    """An environment has no argument of this name.
-
-    It is a TypeError, as in Python, for libraries that try arguments.
-    """
+    """An argument that environments do not have, which libraries try: TorchRL heeds TypeErrors."""
 
 
 class Interface:
@@ -67,7 +44,6 @@ class Interface:
     observation_space: Space[Any]
     action_space: Space[Any]
     tells_terms = True
-    extra: ExtraObservation | None = None
 
     def __init__(self, simulator: Simulator, dtype: DTypeLike = np.float64) -> None:
         try:
@@ -91,15 +67,6 @@ class Interface:
     def observe(self, observations: Array) -> Observations:
         """Show copies of the simulator's observations, shape (n, n_observations)."""
         return observations.astype(self._dtype)
-
-    def show(
-        self, episodes: Episodes, rows: NDArray[np.int64] | slice = slice(None)
-    ) -> Observations:
-        """Observations of some episodes, with further entries if there are any."""
-        shown = self.observe(episodes.observation[rows])
-        if self.extra is None:
-            return shown
-        return self.extra.appended(shown, self.simulator, episodes, rows)
 
     def step_outcome(self, episodes: Episodes, result: StepResult) -> Outcome:  # noqa: ARG002
         """Reward a step, and tell or change which episodes are over."""
@@ -139,27 +106,21 @@ def bounded_space(bounds: tuple[Array, Array], dtype: np.dtype[Any]) -> Space[An
 
 
 class Lifecycle:
-    """An environment that refuses use before a reset and after its end."""
+    """An environment that refuses use before a reset."""
 
-    closed: bool = False
     _episodes: Episodes | None = None
 
     @property
     def episodes(self) -> Episodes:
-        """The episodes, one row per arm; refused before a reset and after the end."""
-        self._check_open()
+        """The episodes, one row per arm; refused before a reset."""
         if self._episodes is None:
-            raise ResetNeededError("the environment was never begun: call reset()")
+            raise InvalidInputError("the environment was never begun: call reset()")
         return self._episodes
 
     @property
     def configuration(self) -> Array:
         """A copy of the joint positions, shape (n, n_joints) [rad or m]."""
         return self.episodes.q.copy()
-
-    def _check_open(self) -> None:
-        if self.closed:
-            raise ClosedEnvironmentError("the environment is closed: make another one")
 
 
 class ArmEnvironment(Lifecycle):
@@ -176,7 +137,6 @@ class ArmEnvironment(Lifecycle):
     simulator: Simulator
     interface: Interface
     metadata: dict[str, Any] = {"render_modes": list(RENDER_MODES), "render_fps": 50}  # noqa: RUF012  (as Gymnasium declares it)
-    _spec: EnvSpec | None = None
 
     def _set_up(
         self,
@@ -185,26 +145,21 @@ class ArmEnvironment(Lifecycle):
         threads: int | None,
         overrides: Mapping[str, Any],
         dtype: DTypeLike,
-        extra: ExtraObservation | None,
         render_mode: str | None,
         **picture: Any,
     ) -> None:
         """Build simulator and interface by the settings of `ReachEnv`."""
         try:
             changed = ReachProblem.load(problem).replace(**overrides)
-            self.simulator = simulator = Simulator(changed, threads=threads)
         except UnknownNameError as error:
             if error.given not in overrides:
                 raise
-            names = ", ".join(error.available)
             raise UnexpectedArgumentError(
-                f"unexpected keyword argument {error.given!r}; available: {names}"
+                f"unexpected keyword argument {error.given!r}: {error}"
             ) from error
+        self.simulator = simulator = Simulator(changed, threads=threads)
         self.render_mode = render_mode
         self.interface = self._make_interface(simulator, dtype)
-        if extra is not None:
-            self.interface.extra = extra
-            self.interface.observation_space = extra.space(self.interface.observation_space)
         self.metadata = self.interface.metadata
         terms = simulator.task.reward.terms if self.interface.tells_terms else ()
         told = (*simulator.task.goal.told, *(f"reward_{name}" for name in terms))
@@ -255,27 +210,6 @@ class ArmEnvironment(Lifecycle):
         """Names of the bodies of a contact, by its number; 0 is none."""
         return (None, *self.simulator.world.contact_model.pair_names)
 
-    @property
-    def spec(self) -> EnvSpec | None:
-        """Specification that makes this environment again, also from JSON."""
-        return self._spec
-
-    @spec.setter
-    def spec(self, spec: EnvSpec | None) -> None:
-        # It states the horizon; what JSON cannot hold becomes `kinarm.ReachProblem.to_json`.
-        self._spec = spec
-        if spec is None:
-            return
-        given = {name: value for name, value in spec.kwargs.items() if name != "max_episode_steps"}
-        settings = {name: _plain(given[name]) for name in SETTINGS if name in given}
-        kwargs = {**given, **settings}
-        try:
-            json.dumps(kwargs)
-        except TypeError:
-            kwargs = {"problem": self.simulator.problem.to_json(), **settings}
-        steps = spec.max_episode_steps or self.simulator.task.horizon
-        self._spec = replace(spec, kwargs=kwargs, max_episode_steps=steps)
-
 
 def fixed_scenario(
     options: Mapping[str, Any] | None, simulator: Simulator, n: int
@@ -313,10 +247,3 @@ def fixed_scenario(
             array = within_limits(name, given, arm.chain, arm.joint_names)
         fixed[name] = np.broadcast_to(array, (n, widths[name]))
     return fixed
-
-
-def _plain(value: Any) -> Any:
-    """A setting for JSON."""
-    if isinstance(value, Enum):
-        return value.value
-    return np.dtype(value).name if isinstance(value, type | np.dtype) else value

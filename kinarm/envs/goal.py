@@ -127,8 +127,8 @@ class GoalInterface(GoalRewards, Interface):
         (self._goal, self._offset), self._own = layout.goal_entries, layout.entries(of_goal=False)
         if goal.hold > 1 or goal.speed is not None or goal.changes:
             raise InvalidInputError(
-                "goals as a dictionary stand and are reached once touched: hold, speed, sequence, "
-                "motion and wander do not apply"
+                "goals as a dictionary stand and are reached once touched: hold, speed, sequence "
+                "and motion do not apply"
             )
         if len(self._goal) != simulator.world.goal_width:
             parts = " and ".join(REST_PARTS[goal.kind])

@@ -7,9 +7,8 @@ import numpy as np
 from numpy.typing import DTypeLike
 
 from kinarm.envs.environment import ArmEnvironment, Array, Observations, one_by_one
-from kinarm.envs.extra import ExtraObservation
-from kinarm.episodes import COLLISION, RUNNING, SUCCESS, TRUNCATED, Episodes
-from kinarm.errors import finite_array
+from kinarm.episodes import RUNNING, Episodes
+from kinarm.errors import InvalidInputError, finite_array
 from kinarm.problem import ProblemLike
 from kinarm.simulator import StepResult
 
@@ -34,8 +33,6 @@ class ReachEnv(ArmEnvironment, gymnasium.Env[Any, Array]):
         Where pictures are taken from.
     observation_dtype : {"float64", "float32"}
         Type of observations.
-    extra_observation : kinarm.ExtraObservation, optional
-        Further entries, computed in Python.
     **overrides
         What `kinarm.ReachProblem.replace` takes, such as ``arm``,
         ``tolerance``, ``horizon``, ``start_spread``, or ``reward={"success":
@@ -75,8 +72,7 @@ class ReachEnv(ArmEnvironment, gymnasium.Env[Any, Array]):
 
     **End**: terminated when the tool is within 0.05 m of the goal, or when a
     move would touch the ground, an obstacle or the arm itself (the move is
-    refused); truncated after 64 steps. Then nothing moves until `reset`: steps
-    have the reward 0, and Gymnasium warns.
+    refused); truncated after 64 steps. A step after the end is an error.
 
     **Info**: ``distance`` [m]; ``configuration``, the joint positions [rad or
     m], as the attribute of that name has them; and after a step ``success``
@@ -96,11 +92,10 @@ class ReachEnv(ArmEnvironment, gymnasium.Env[Any, Array]):
         height: int = 360,
         camera: Any = None,
         observation_dtype: DTypeLike = np.float64,
-        extra_observation: ExtraObservation | None = None,
         **overrides: Any,
     ) -> None:
         picture = {"width": width, "height": height, "camera": camera}
-        settings = overrides, observation_dtype, extra_observation, render_mode
+        settings = overrides, observation_dtype, render_mode
         self._set_up(problem, 1, 1, *settings, **picture)
         self.observation_space = self.interface.observation_space
         self.action_space = self.interface.action_space
@@ -109,7 +104,6 @@ class ReachEnv(ArmEnvironment, gymnasium.Env[Any, Array]):
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Observations, dict[str, Any]]:
         """Begin an episode; ``options`` may set ``start`` and ``goal``."""
-        self._check_open()
         super().reset(seed=seed)
         if self._episodes is None or seed is not None:
             self._queues.seed(0, self.np_random)
@@ -120,24 +114,17 @@ class ReachEnv(ArmEnvironment, gymnasium.Env[Any, Array]):
     def step(self, action: Array) -> tuple[Observations, float, bool, bool, dict[str, Any]]:
         """Move for one time step."""
         episode = self.episodes
-        over = episode.status.item() != RUNNING
+        if episode.status.item() != RUNNING:
+            raise InvalidInputError("the episode is over: call reset() first")
         try:
             result = self.simulator.step(episode, np.asarray(action)[None])
         except ValueError:  # of the simulator, or of NumPy
             finite_array("action", action, (self.simulator.n_actions,))
             raise
-        if over:  # tell of the end again
-            gymnasium.logger.warn(
-                "step() was called although the episode is over: call reset() first. "
-                "Nothing moves until then, and rewards are 0."
-            )
-            status = episode.status
-            result.flags[:] = np.equal.outer((TRUNCATED, SUCCESS, COLLISION), status)
-            result.contact[:] = episode.touched * (status == COLLISION)
         reward, terminated, truncated = self.interface.step_outcome(episode, result)
         self._find_contacts(episode, result)
         self._pictures.step(episode)
-        answer = 0.0 if over else reward.item(), terminated.item(), truncated.item()
+        answer = reward.item(), terminated.item(), truncated.item()
         return self._observation(episode), *answer, self._info(episode, result)
 
     def render(self) -> Any:
@@ -152,12 +139,11 @@ class ReachEnv(ArmEnvironment, gymnasium.Env[Any, Array]):
         return np.array(self.episodes.q[0])
 
     def close(self) -> None:
-        """Close the live page, if any; nothing can be done afterwards."""
-        self.closed = True
+        """Close the live page, if any."""
         self._pictures.close()
 
     def _observation(self, episode: Episodes) -> Observations:
-        return one_by_one(self.interface.show(episode), 1)[0]
+        return one_by_one(self.interface.observe(episode.observation), 1)[0]
 
     def _info(self, episode: Episodes, result: StepResult) -> dict[str, Any]:
         told = dict(zip(self._told, result.numbers[1:, 0].tolist(), strict=False))

@@ -11,7 +11,7 @@ from kinarm.episode_scenes import scene_of_episode
 from kinarm.episodes import COLLISION, SUCCESS, TRUNCATED, Episodes
 from kinarm.errors import InvalidInputError, whole_number
 from kinarm.simulator import Simulator
-from kinarm.viewer.camera import Camera, CameraLike
+from kinarm.viewer.camera import Camera
 
 if TYPE_CHECKING:
     from kinarm.collision import Contact
@@ -26,21 +26,6 @@ OUTCOMES = {SUCCESS: "success", COLLISION: "collision", TRUNCATED: "truncated"}
 
 FULL_SIZE = 4
 """Largest number of arms with full-size pictures; more share their area."""
-
-
-class Pictures(tuple[Picture, ...]):
-    """Pictures of all arms, of one size, as in Gymnasium."""
-
-    @property
-    def tiled(self) -> Picture:
-        """All in one picture, row by row; empty tiles are white."""
-        height, width = self[0].shape[:2]
-        columns = math.ceil(math.sqrt(len(self)))
-        rows = math.ceil(len(self) / columns)
-        sheet = np.full((rows, height, columns, width, 3), 255, dtype=np.uint8)
-        for number, picture in enumerate(self):
-            sheet[number // columns, :, number % columns] = picture
-        return sheet.reshape(rows * height, columns * width, 3)
 
 
 class EnvPictures:
@@ -70,7 +55,7 @@ class EnvPictures:
         *,
         width: int = 480,
         height: int = 360,
-        camera: CameraLike | None = None,
+        camera: Camera | None = None,
     ) -> None:
         if mode is not None and mode not in RENDER_MODES:
             raise InvalidInputError(
@@ -81,7 +66,9 @@ class EnvPictures:
         sides = {"width": width, "height": height}.items()
         wanted = [whole_number(name, pixels, 1) for name, pixels in sides]
         self._size = [max(round(pixels * share), 1) for pixels in wanted]
-        self._camera = None if camera is None else Camera.checked(camera)
+        if camera is not None and not isinstance(camera, Camera):
+            raise InvalidInputError(f"camera must be a kinarm.viewer.Camera, got {camera!r}")
+        self._camera = camera
         self.mode = mode
         self._simulator, self._num_envs = simulator, num_envs
         self._traces = np.empty((num_envs if mode else 0, simulator.task.horizon + 1, 3))
@@ -133,7 +120,7 @@ class EnvPictures:
             self._stage.server.close()
         self._stage, self._renderers = None, {}
 
-    def render(self) -> Pictures | None:
+    def render(self) -> tuple[Picture, ...] | None:
         """A picture of each arm, in the mode for it."""
         if self.mode != "rgb_array":
             return None
@@ -144,7 +131,7 @@ class EnvPictures:
             time = self._begun.steps[row] * self._simulator.problem.stepping.time_step
             shown = {"trace": trace, "outcome": outcome, "contact": contact, "time": time}
             pictures.append(render(q, goal, **shown))
-        return Pictures(pictures)
+        return tuple(pictures)
 
     def _renderer(self, row: int) -> "Renderer":
         """Renderer of an arm's scene, one for all arms if they have the same."""

@@ -10,7 +10,6 @@ from gymnasium.vector.utils import batch_space
 from numpy.typing import DTypeLike, NDArray
 
 from kinarm.envs.environment import ArmEnvironment, Array, Observations, one_by_one
-from kinarm.envs.extra import ExtraObservation
 from kinarm.episodes import RUNNING, Episodes
 from kinarm.errors import InvalidInputError, whole_number
 from kinarm.problem import ProblemLike
@@ -36,7 +35,7 @@ class ReachVectorEnv(ArmEnvironment, VectorEnv[Any, Array, NDArray[Any]]):
         ``reset(options={"reset_mask": mask})``.
     threads : int, optional
         As for `kinarm.Simulator`.
-    render_mode, width, height, camera, observation_dtype, extra_observation
+    render_mode, width, height, camera, observation_dtype
         As for `ReachEnv`; `render` returns a picture per arm.
     max_episode_steps : int, optional
         Gymnasium's name of the horizon.
@@ -61,7 +60,6 @@ class ReachVectorEnv(ArmEnvironment, VectorEnv[Any, Array, NDArray[Any]]):
         height: int = 360,
         camera: Any = None,
         observation_dtype: DTypeLike = np.float64,
-        extra_observation: ExtraObservation | None = None,
         max_episode_steps: int | None = None,
         **overrides: Any,
     ) -> None:
@@ -75,7 +73,7 @@ class ReachVectorEnv(ArmEnvironment, VectorEnv[Any, Array, NDArray[Any]]):
             ) from error
         if max_episode_steps is not None:
             overrides = {"horizon": max_episode_steps, **overrides}
-        settings = threads, overrides, observation_dtype, extra_observation, render_mode
+        settings = threads, overrides, observation_dtype, render_mode
         picture = {"width": width, "height": height, "camera": camera}
         self._set_up(problem, num_envs, *settings, **picture)
         self.metadata = {**self.metadata, "autoreset_mode": self.autoreset_mode}
@@ -99,7 +97,6 @@ class ReachVectorEnv(ArmEnvironment, VectorEnv[Any, Array, NDArray[Any]]):
         ``options`` may hold ``reset_mask``, a boolean array, shape (num_envs,), of arms to reset,
         and ``start`` and ``goal``, shape (num_envs, n_joints) and (num_envs, 3), or one for all.
         """
-        self._check_open()
         chosen = dict(options or {})
         rows = self._masked_rows(chosen.pop("reset_mask", None))
         seeds = self._seeds(seed)
@@ -110,7 +107,7 @@ class ReachVectorEnv(ArmEnvironment, VectorEnv[Any, Array, NDArray[Any]]):
         mask = np.zeros(self.num_envs, dtype=bool)
         mask[rows] = True
         distance = np.where(mask, episodes.distance, 0.0)
-        shown = self.interface.show(episodes)
+        shown = self.interface.observe(episodes.observation)
         return shown, {"distance": distance, "_distance": mask, **_configurations(episodes, mask)}
 
     def step(
@@ -138,7 +135,7 @@ class ReachVectorEnv(ArmEnvironment, VectorEnv[Any, Array, NDArray[Any]]):
                 reward[rows] = 0.0
                 self._renew(episodes, rows, infos)
         infos |= _configurations(episodes, infos["_distance"])
-        return self.interface.show(episodes), reward, terminated, truncated, infos
+        return self.interface.observe(episodes.observation), reward, terminated, truncated, infos
 
     def render(self) -> Any:
         """Take a picture of every arm (``render_mode``)."""
@@ -169,7 +166,7 @@ class ReachVectorEnv(ArmEnvironment, VectorEnv[Any, Array, NDArray[Any]]):
         for table in tables:
             np.copyto(table, False, where=over)  # which is a zero of every type
         final_obs = np.empty(self.num_envs, dtype=object)
-        shown = one_by_one(self.interface.show(episodes, rows), rows.size)
+        shown = one_by_one(self.interface.observe(episodes.observation[rows]), rows.size)
         for row, observation in zip(rows.tolist(), shown, strict=True):
             final_obs[row] = observation
         infos: dict[str, Any] = self._named(tables, ~over)

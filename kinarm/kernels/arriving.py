@@ -12,8 +12,7 @@ from numpy.typing import NDArray
 from kinarm.chain import Chain
 from kinarm.episodes import Episodes, Rules
 from kinarm.kernels.compiling import Array, inlined
-from kinarm.kernels.elementary import SMALLEST
-from kinarm.kernels.goals import GoalRules, nearer_sign, turn_between, write_reached
+from kinarm.kernels.goals import GoalRules, turn_between, write_reached
 from kinarm.kernels.kinematics import to_world
 from kinarm.kernels.lanes import any_lane, as_numbers, select
 from kinarm.kernels.reward import ROTATION, add_reward
@@ -36,21 +35,6 @@ def put_goal(
         Where it goes.
     """
     wanted, width = as_numbers(held), goals.shape[2]
-    if goal.wander > 0:
-        number = step // goal.wander
-        share = (step - number * goal.wander) / goal.wander
-        # Of two opposite quaternions the nearer one.
-        sign, square = nearer_sign(goal.kind, goals[e], number, goals[e], number + 1), 0.0
-        for i in range(width):
-            start, end = goals[e, number, i], goals[e, number + 1, i]
-            if i >= 3:
-                start *= sign
-            wanted[0, i, lane] = start + share * (end - start)
-        for i in range(3, width):
-            square += wanted[0, i, lane] * wanted[0, i, lane]
-        for i in range(3, width):
-            wanted[0, i, lane] /= math.sqrt(max(square, SMALLEST))
-        return
     number = min(number, goal.sequence - 1)
     for i in range(width):
         wanted[0, i, lane] = goals[e, number, i]
@@ -106,7 +90,7 @@ def arrive(
     """
     goal = rules.goal
     before, turn = block.distance[0], block.turn[0]
-    if goal.moves.shape[0] > 0 or goal.wander > 0:
+    if goal.moves.shape[0] > 0:
         put_goals(row, goal, episodes, block)
     x, y, z = block.reached[0, 0], block.reached[0, 1], block.reached[0, 2]
     after = measure(chain, goal, poses, block)

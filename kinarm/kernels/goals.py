@@ -25,9 +25,8 @@ class GoalRules(NamedTuple):
 
     Attributes
     ----------
-    kind, hold, sequence, wander : int
-        Kind of the goals; steps in a row that a goal is to be kept; goals of an episode;
-        and steps of a walk to the next goal, 0 if goals do not wander.
+    kind, hold, sequence : int
+        Kind of the goals; steps in a row that a goal is to be kept; and goals of an episode.
     tolerance : float
         Error of the rest at which it counts as reached [rad, or rad or m].
     stride : float
@@ -43,7 +42,6 @@ class GoalRules(NamedTuple):
     kind: int
     hold: int
     sequence: int
-    wander: int
     tolerance: float
     stride: float
     axis: Array

@@ -23,22 +23,18 @@ SEED = 0xBF58476D1CE4E5B9
 """Begins the random numbers of plants, which are not those of scenes."""
 
 SUBSTEPS = 5
-"""Parts of a step in which limits of velocity, acceleration and jerk hold."""
+"""Parts of a step in which limits of velocity and acceleration hold."""
 
 DELAY, RESOLUTION, NOISE, GOAL_NOISE, HIGH_BITS, LOW_BITS = range(6)
-SERVO, MOST_CHANGE, TRAPEZE, BRAKE, JERK, EASE, RATE, STEADY = 6, 10, 11, 12, 13, 14, 15, 16
-OFFSETS = 17
+SERVO, MOST_CHANGE, TRAPEZE, RATE, STEADY, OFFSETS = 6, 10, 11, 12, 13, 14
 """Entries of an episode's plant: delay [steps], resolution, standard deviations of noise, and the
 bits of its random state; the servo's matrix for a part of a step, most change of velocity in one,
-and how much of that change the part's way lacks. Of joints without servos, else 0: most change of
-a part's way, most change of the change of velocity, and what a limit of jerk takes off a part's way
-before a stop. `kinarm.kernels.shield` knows the servo's natural frequency [1/s], and how fast the
-joints may swing without meeting those limits. Then follow bias and calibration of each joint, and
-the goal's bias."""
+and how much of that change the part's way lacks. `kinarm.kernels.shield` knows the servo's natural
+frequency [1/s], and how fast the joints may swing without meeting those limits. Then follow bias
+and calibration of each joint, and the goal's bias."""
 
-COMMAND, VELOCITY, CHANGE, FORMER = range(4)
-"""Rows of an episode's drive: command, velocity, its change in the last part of a step, and former
-commands."""
+COMMAND, VELOCITY, FORMER = range(3)
+"""Rows of an episode's drive: command, velocity, and former commands."""
 
 
 def plant_width(n_actuated: int) -> int:
@@ -71,39 +67,33 @@ def draw_plants(
         for i in range(drawn.shape[0]):
             lower, upper = draws.ranges[i, 0], draws.ranges[i, 1]
             drawn[i] = lower + uniform(state) * (upper - lower)
+            if i == 3:
+                uniform(state)  # once drew another limit: plants are those of recorded figures
         # As likely for each number of steps.
         lower, upper = draws.ranges[0, 0], draws.ranges[0, 1]
         plant[DELAY] = lower + math.floor(uniform(state) * (upper - lower + 1.0))
-        bandwidth, damping, acceleration, jerk = drawn[1], drawn[2], drawn[3], drawn[4]
-        plant[RESOLUTION], plant[NOISE], plant[GOAL_NOISE] = drawn[5], drawn[6], drawn[9]
-        fill_servo(plant, draws.order, bandwidth, damping, part)
-        limited = acceleration > 0.0
-        plant[MOST_CHANGE] = acceleration * part if limited else np.inf
-        plant[TRAPEZE] = 0.5 if bandwidth > 0.0 and draws.order == 2 else 0.0
-        plant[BRAKE] = acceleration * part * part if limited and bandwidth == 0.0 else 0.0
-        plant[JERK] = jerk * part * part
-        plant[EASE] = 0.5 * acceleration * acceleration / jerk * part if jerk > 0.0 else 0.0
-        fill_calm(plant, draws.order, bandwidth, damping, part)
+        bandwidth, damping, acceleration = drawn[1], drawn[2], drawn[3]
+        plant[RESOLUTION], plant[NOISE], plant[GOAL_NOISE] = drawn[4], drawn[5], drawn[8]
+        fill_servo(plant, bandwidth, damping, part)
+        plant[MOST_CHANGE] = acceleration * part if acceleration > 0.0 else np.inf
+        plant[TRAPEZE] = 0.5 if bandwidth > 0.0 else 0.0
+        fill_calm(plant, bandwidth, damping, part)
         for kind in range(2):
             for axis in range(n_actuated):
-                offset = drawn[7 + kind] * (2.0 * uniform(state) - 1.0)
+                offset = drawn[6 + kind] * (2.0 * uniform(state) - 1.0)
                 plant[OFFSETS + kind * n_actuated + axis] = offset
         for i in range(3):
-            plant[OFFSETS + 2 * n_actuated + i] = drawn[10] * (2.0 * uniform(state) - 1.0)
+            plant[OFFSETS + 2 * n_actuated + i] = drawn[9] * (2.0 * uniform(state) - 1.0)
 
 
 @inlined
-def fill_servo(plant: Array, order: int, bandwidth: float, damping: float, part: float) -> None:
+def fill_servo(plant: Array, bandwidth: float, damping: float, part: float) -> None:
     """Fill in how a servo's error and velocity follow from those a part of a step before."""
     rate = 6.283185307179586 * bandwidth
-    decay = rate * (damping if order == 2 else 1.0)
+    decay = rate * damping
     if bandwidth == 0.0 or decay * part > 500.0:
         plant[SERVO], plant[SERVO + 1] = 0.0, 0.0
         plant[SERVO + 2], plant[SERVO + 3] = -1.0 / part, 0.0
-    elif order == 1:
-        left = exponential(-rate * part)
-        plant[SERVO], plant[SERVO + 1] = left, 0.0
-        plant[SERVO + 2], plant[SERVO + 3] = (left - 1.0) / part, 0.0
     else:
         # e'' = -rate^2 e - 2 damping rate e', by its two exponentials or damped oscillation.
         split = rate * math.sqrt(abs(1.0 - damping * damping))
@@ -121,18 +111,16 @@ def fill_servo(plant: Array, order: int, bandwidth: float, damping: float, part:
 
 
 @inlined
-def fill_calm(plant: Array, order: int, bandwidth: float, damping: float, part: float) -> None:
+def fill_calm(plant: Array, bandwidth: float, damping: float, part: float) -> None:
     """Fill in the rate of the joints' swing, and up to which speed no limit acts on it.
 
-    A servo of second order accelerates by at most rate^2 |e| + 2 damping rate |v|; others change
-    their velocity by at most |v| + rate |e| at once.
+    A servo accelerates by at most rate^2 |e| + 2 damping rate |v|; joints that obey at once change
+    their velocity by at most |v| + rate |e|.
     """
     servo = bandwidth > 0.0 and plant[SERVO] != 0.0
     plant[RATE] = 6.283185307179586 * bandwidth if servo else 1.0 / part
-    gain = plant[RATE] * part * (1.0 + 2.0 * damping) if servo and order == 2 else 2.0
+    gain = plant[RATE] * part * (1.0 + 2.0 * damping) if servo else 2.0
     plant[STEADY] = plant[MOST_CHANGE] / gain
-    if plant[JERK] > 0.0:
-        plant[STEADY] = min(plant[STEADY], 0.25 * plant[JERK])
 
 
 @inlined
@@ -141,9 +129,6 @@ def move_joints(chain: Chain, rules: Rules, fresh: bool, block: Block) -> None:
     plant, drive = block.plant, block.drive
     n_actuated, longest = rules.step_limit.shape[0], drive.shape[0] - FORMER
     part = rules.time_step / SUBSTEPS
-    brake, jerk = plant[0, BRAKE], plant[0, JERK]
-    brakes, eases = any_lane(brake > 0.0), any_lane(jerk > 0.0)
-    half = 0.5 * brake + plant[0, EASE]
     for axis in range(n_actuated):
         limit, lower, upper = rules.step_limit[axis], chain.lower[axis], chain.upper[axis]
         command = min(max(drive[COMMAND, axis] + block.action[0, axis] * limit, lower), upper)
@@ -162,33 +147,22 @@ def move_joints(chain: Chain, rules: Rules, fresh: bool, block: Block) -> None:
         for k in range(longest):
             told = select(plant[0, DELAY] == k + 1.0, drive[FORMER + k, axis], told)
         told += plant[0, OFFSETS + n_actuated + axis]
-        start, velocity, change = block.q[0, axis], drive[VELOCITY, axis], drive[CHANGE, axis]
+        start, velocity = block.q[0, axis], drive[VELOCITY, axis]
         q, fastest = start, limit / rules.time_step
         for _ in range(SUBSTEPS):
             error = q - told
             exact = told + plant[0, SERVO] * error + plant[0, SERVO + 1] * velocity
             wanted = plant[0, SERVO + 2] * error + plant[0, SERVO + 3] * velocity
-            most, free = fastest + 0.0 * error, wanted - velocity
-            if brakes:
-                # So fast that it can still stop at the command.
-                stops = math.sqrt(half * half + 2.0 * brake * abs(error)) - half
-                most = select(brake > 0.0, min(most, stops / part), most)
-            former, change = change, min(max(wanted, -most), most) - velocity
+            free, change = wanted - velocity, min(max(wanted, -fastest), fastest) - velocity
             change = min(max(change, -plant[0, MOST_CHANGE]), plant[0, MOST_CHANGE])
-            if eases:
-                # So much that acceleration can still end at that velocity.
-                ends = math.sqrt(0.25 * jerk * jerk + 2.0 * jerk * abs(change)) - 0.5 * jerk
-                eased = min(max(min(max(change, -ends), ends), former - jerk), former + jerk)
-                change = select(jerk > 0.0, eased, change)
             velocity += change
             way = part * (velocity - plant[0, TRAPEZE] * change)
             q = min(max(select(change == free, exact, q + way), lower), upper)
             stopped = (q <= lower) | (q >= upper)
-            velocity, change = select(stopped, 0.0, velocity), select(stopped, 0.0, change)
+            velocity = select(stopped, 0.0, velocity)
         within = min(max(q, start - limit), start + limit)
         block.target[0, axis] = select(fresh, within, block.target[0, axis])
         drive[VELOCITY, axis] = select(fresh, velocity, drive[VELOCITY, axis])
-        drive[CHANGE, axis] = select(fresh, change, drive[CHANGE, axis])
 
 
 @inlined
@@ -198,7 +172,7 @@ def rest(e: int, episodes: Episodes) -> None:
     for row in range(drive.shape[1]):
         for axis in range(n_actuated):
             command = episodes.q[e, axis] - episodes.plant[e, OFFSETS + n_actuated + axis]
-            drive[e, row, axis] = 0.0 if row in (VELOCITY, CHANGE) else command
+            drive[e, row, axis] = 0.0 if row == VELOCITY else command
 
 
 @inlined

@@ -28,7 +28,6 @@ from kinarm.kernels.lane_copies import (
 from kinarm.kernels.lanes import LANES, as_numbers, lane_bits, select
 from kinarm.kernels.planes import FINE, GAP, height_above, separate
 from kinarm.kernels.plant import (
-    CHANGE,
     COMMAND,
     DELAY,
     OFFSETS,
@@ -338,7 +337,6 @@ def comes_to_rest(passed: float, warned: float, session: Session) -> bool:
             swing = math.sqrt(velocity * velocity + rate * rate * error * error)
             fastest = rules.step_limit[axis] / rules.time_step
             calm = calm & (swing <= min(plant[0, STEADY], fastest))
-            calm = calm & (abs(ahead.drive[CHANGE, axis]) <= plant[0, STEADY])
             calm = calm & (plant[0, DELAY] <= passed + 1.0)
             # How far it may still go.
             ahead.action[0, axis] = abs(error) + swing / rate

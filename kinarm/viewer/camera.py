@@ -1,18 +1,22 @@
 """Where pictures are taken from."""
 
 import math
-from collections.abc import Mapping, Sequence
-from typing import Any, NamedTuple
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
+from kinarm._fields import Checked
 from kinarm.arm import Arm
-from kinarm.errors import InvalidInputError, finite_array
+from kinarm.errors import InvalidInputError
 from kinarm.problem import ReachProblem
 from kinarm.scene import Scene
 
 FIELD_OF_VIEW = 30.0
+OPENING = {
+    "must": "be between 0 and 180 degrees",
+    "holds": lambda angle: 0 < angle < 180,
+}
 TARGET, EYE = (0.05, 0.1, 0.38), (-2.42, 1.9, 1.5)
 """Middle of the picture, and the camera relative to it, if goals lie on the
 left [m]: as on the replay page, but with room for an upright arm."""
@@ -21,20 +25,31 @@ NEAR, FAR = 1.0, 1.45
 """Stages of a radius between these are seen from there; others scale that [m]."""
 
 
-class Camera(NamedTuple):
+@dataclass(frozen=True)
+class Camera(Checked):
     """A pinhole camera.
 
-    Attributes
+    Parameters
     ----------
     position, target : tuple of float
         Its place and the middle of the picture, in the world [m].
     field_of_view : float
         Angle between the picture's upper and lower edges [degrees].
+
+    Raises
+    ------
+    InvalidInputError
+        If the camera sees nothing.
     """
 
-    position: tuple[float, ...]
-    target: tuple[float, ...]
-    field_of_view: float = FIELD_OF_VIEW
+    position: tuple[float, float, float]
+    target: tuple[float, float, float]
+    field_of_view: float = field(default=FIELD_OF_VIEW, metadata=OPENING)
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if math.dist(self.target, self.position) < 1e-6:
+            raise InvalidInputError(f"position and target are the same: {self.position}")
 
     @classmethod
     def of_replays(cls, problem: ReachProblem, arm: Arm | None = None) -> "Camera":
@@ -49,33 +64,6 @@ class Camera(NamedTuple):
         target = scale * np.array(TARGET) * (1, side, 1)
         eye = target + scale * np.array(EYE) * (1, side, 1)
         return cls(tuple(eye.tolist()), tuple(target.tolist()))
-
-    @classmethod
-    def checked(cls, camera: "CameraLike") -> "Camera":
-        """Make a camera of a mapping or a sequence of its values.
-
-        Raises
-        ------
-        InvalidInputError
-            If it is neither, or the camera sees nothing.
-        """
-        try:
-            given = cls(**camera) if isinstance(camera, Mapping) else cls(*camera)
-        except TypeError as error:
-            raise InvalidInputError(
-                f"camera must be a Camera, got {camera!r}; expected {', '.join(cls._fields)}"
-            ) from error
-        position, target, angle = (
-            finite_array(f"camera's {name}", getattr(given, name), shape).tolist()
-            for name, shape in zip(cls._fields, ((3,), (3,), ()), strict=True)
-        )
-        if not 0 < angle < 180:
-            raise InvalidInputError(
-                f"camera's field_of_view must be between 0 and 180 degrees, got {angle:g}"
-            )
-        if math.dist(target, position) < 1e-6:
-            raise InvalidInputError(f"camera's position and target are the same: {position}")
-        return cls(tuple(position), tuple(target), angle)
 
     def projection(self, width: int, height: int) -> NDArray[np.float64]:
         """World to picture, shape (3, 4).
@@ -101,6 +89,3 @@ def stage_scale(arm: Arm, scene: Scene) -> float:
     corners = [corner for region in scene.goal_regions for corner in (region.lower, region.upper)]
     radius = max([arm.reach, *(float(np.linalg.norm(corner)) for corner in corners)])
     return radius / min(max(radius, NEAR), FAR)
-
-
-CameraLike = Camera | Mapping[str, Any] | Sequence[Any]

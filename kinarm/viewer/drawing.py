@@ -3,15 +3,14 @@
 import struct
 import threading
 from collections import defaultdict
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import replace
 from itertools import count
 from typing import Any
 
 import numpy as np
 import umsgpack
-from meshcat import Visualizer
-from meshcat.geometry import LineBasicMaterial, Object
+from meshcat import Visualizer, geometry
 from numpy.typing import NDArray
 
 from kinarm.arm import Arm
@@ -66,8 +65,7 @@ class DrawnScene:
     def __init__(self) -> None:
         self.window, self.ids = Visualizer(window=self), count()
         self._commands: dict[tuple[str, str, str], tuple[int, bytes]] = {}
-        self._last, self._closed = 0, False
-        self._changed = threading.Condition()
+        self._last, self._lock = 0, threading.Lock()
 
     def send(self, command: Any) -> None:
         """Take a command; Meshcat calls this."""
@@ -78,41 +76,27 @@ class DrawnScene:
         path, kind, packed = command["path"], command["type"], umsgpack.packb(command)
         key = (path, kind, command.get("property", ""))
         below = f"{path.rstrip('/')}/"
-        with self._changed:
+        with self._lock:
             for other in [*self._commands] if kind == "delete" else ():
                 if other[0] == path or other[0].startswith(below):
                     del self._commands[other]
             self._commands.pop(key, None)  # so that the latest commands come last
             self._last += 1
             self._commands[key] = self._last, struct.pack("<I", len(packed)) + packed
-            self._changed.notify_all()
 
     @property
     def content(self) -> bytes:
         """All commands that count."""
         return b"".join(told for _, told in self._commands.values())
 
-    def close(self) -> None:
-        """End all `changes`."""
-        with self._changed:
-            self._closed = True
-            self._changed.notify_all()
-
-    def changes(self) -> Iterator[bytes]:
-        """All commands that count, then new ones, until the scene is closed."""
-        seen = 0
-        while True:
-            with self._changed:
-                while not self._closed and self._last == seen:
-                    self._changed.wait()
-                if self._closed:
-                    return
-                news = [told for number, told in self._commands.values() if number > seen]
-                seen = self._last
-            yield from news
+    def news(self, since: int) -> bytes:
+        """How many commands there were, and those that count of what came after so many."""
+        with self._lock:
+            told = [told for number, told in self._commands.values() if number > since]
+            return struct.pack("<I", self._last) + b"".join(told)
 
 
-class _Described(Object):
+class _Described(geometry.Object):
     """An object in the words of three.js."""
 
     def __init__(self, description: Mapping[str, Any]) -> None:
@@ -123,68 +107,32 @@ class _Described(Object):
         return self.description
 
 
+class MeshStandardMaterial(geometry.GenericMaterial):
+    """Three.js' standard material, which Meshcat lacks."""
+
+    _type = "MeshStandardMaterial"
+
+
 def put(window: Visualizer, finish: Finish, *meshes: Mesh) -> None:
-    """Show meshes with one finish; the longest side has 65535 steps."""
-    vertices, normals, faces = Mesh.joined(meshes).with_normals()
-    low, high = vertices.min(axis=0), vertices.max(axis=0)
-    middle, step = (low + high) / 2, max((high - low).max(), 1e-9) / 65534
-    transform = np.diag([step, step, step, 1.0])
-    transform[3, :3] = middle  # transposed: three.js reads by columns
-    position = np.round((vertices - middle) / step).astype(np.int16)
-    normal = np.round(127 * normals).astype(np.int8)
-    index = faces.astype(np.uint16 if faces.max(initial=0) < 2**16 else np.uint32)
-    geometry = {
-        "attributes": {"position": _typed_array(position, 3), "normal": _typed_array(normal, 3)},
-        "index": _typed_array(index, 1),
-    }
-    _show(window, "Mesh", geometry, _material(finish), transform)
+    """Show meshes with one finish, from outside alone."""
+    vertices, _, faces = Mesh.joined(meshes).with_normals()
+    kind = geometry.MeshBasicMaterial if finish.glow else MeshStandardMaterial
+    material = kind(
+        color=finish.colour,
+        opacity=finish.opacity,
+        depthWrite=finish.opacity == 1,
+        roughness=finish.roughness,
+        metalness=finish.metalness,
+        side=0,
+    )
+    _show(window, geometry.Mesh(geometry.TriangularMeshGeometry(vertices, faces), material))
 
 
-def _show(
-    window: Visualizer,
-    kind: str,
-    geometry: Mapping[str, Any],
-    material: Mapping[str, Any],
-    transform: NDArray[np.float64],
-) -> None:
-    """Show an object of three.js."""
-    shape, look, own = (f"id-{next(window.window.ids)}" for _ in range(3))
-    description = {
-        "metadata": {"version": 4.5, "type": "Object"},
-        "geometries": [{"uuid": shape, "type": "BufferGeometry", "data": geometry}],
-        "materials": [{"uuid": look, **material}],
-        "object": {
-            "uuid": own,
-            "type": kind,
-            "geometry": shape,
-            "material": look,
-            "matrix": transform.ravel().tolist(),
-        },
-    }
-    window.set_object(_Described(description))
-
-
-def _material(look: Finish) -> dict[str, Any]:
-    """A finish in the words of three.js."""
-    described: dict[str, Any] = {"color": look.colour, "opacity": look.opacity}
-    if look.opacity < 1:
-        described |= {"transparent": True, "depthWrite": False}
-    if look.glow:
-        return described | {"type": "MeshBasicMaterial"}
-    shine = {"roughness": look.roughness, "metalness": look.metalness}
-    return described | shine | {"type": "MeshStandardMaterial"}
-
-
-EXTENSIONS = {"int8": 0x11, "int16": 0x13, "uint16": 0x14, "uint32": 0x16, "float32": 0x17}
-"""Codes of MessagePack's extensions that three.js reads as typed arrays."""
-
-
-def _typed_array(array: NDArray[np.generic], size: int) -> dict[str, object]:
-    """An array in as few bytes as three.js reads."""
-    name = array.dtype.name
-    data = umsgpack.Ext(EXTENSIONS[name], array.tobytes())
-    kind, normalized = f"{name.capitalize()}Array", name == "int8"
-    return {"itemSize": size, "type": kind, "array": data, "normalized": normalized}
+def _show(window: Visualizer, shown: geometry.Object) -> None:
+    """Show an object; names that are counted make pages the same again."""
+    for part in (shown, shown.geometry, shown.material):
+        part.uuid = f"id-{next(window.window.ids)}"
+    window.set_object(shown)
 
 
 def draw_stage(window: Visualizer, arm: Arm, scene: Scene) -> list[Visualizer]:
@@ -221,10 +169,8 @@ def draw_surroundings(window: Visualizer, scene: Scene) -> None:
     window["sun"]["<object>"].set_property("position", list(SUN_PLACE))
     if scene.ground:
         put(window["floor"], FLOOR, cylinder(0.002, FLOOR_RADIUS, 0.0).moved((0, 0, -0.002)))
-        lines = {"attributes": {"position": _typed_array(grid_lines().astype(np.float32), 3)}}
-        material = LineBasicMaterial(color=GRID_COLOUR).lower({})
-        del material["uuid"]
-        _show(window["grid"], "LineSegments", lines, material, np.eye(4))
+        lines = geometry.PointsGeometry(grid_lines().T)
+        _show(window["grid"], geometry.LineSegments(lines, geometry.LineBasicMaterial(GRID_COLOUR)))
     _draw_obstacles(window["obstacles"], scene)
 
 

@@ -2,29 +2,22 @@
 
 const viewer = new MeshCat.Viewer(document.getElementById("stage"));
 
-/** Show what the server sends: commands without end, each led by its length. */
+/** Show what the server has to tell: a number to ask with next, and commands, each led by its length. */
 async function follow() {
-  const reader = (await fetch("scene")).body.getReader();
-  let rest = new Uint8Array();
-  for (;;) {
-    const { done, value } = await reader.read();
-    if (done) {
-      return;
-    }
-    const bytes = new Uint8Array(rest.length + value.length);
-    bytes.set(rest);
-    bytes.set(value, rest.length);
+  for (let since = 0; ;) {
+    const bytes = new Uint8Array(await (await fetch(`scene?${since}`)).arrayBuffer());
     const view = new DataView(bytes.buffer);
-    let at = 0;
-    while (at + 4 <= bytes.length && at + 4 + view.getUint32(at, true) <= bytes.length) {
-      const length = view.getUint32(at, true);
-      viewer.handle_command_bytearray(bytes.slice(at + 4, at + 4 + length));
-      at += 4 + length;
+    since = view.getUint32(0, true);
+    for (let at = 4; at < bytes.length;) {
+      const end = at + 4 + view.getUint32(at, true);
+      viewer.handle_command_bytearray(bytes.slice(at + 4, end));
+      at = end;
     }
-    rest = bytes.subarray(at);
+    await new Promise((resolve) => setTimeout(resolve, 50));
   }
 }
 
-follow().catch(console.info).then(() => {
+follow().catch((reason) => {
+  console.info(reason);
   document.title = "kinarm, no longer live";
 });

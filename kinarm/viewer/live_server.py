@@ -1,6 +1,5 @@
 """Scenes and problems with moving arms, served live to browsers."""
 
-import errno
 import sys
 import threading
 import time
@@ -31,7 +30,6 @@ from kinarm.viewer.parts import goal_pose
 
 HOST = "127.0.0.1"
 PORT, LAST_PORT = 7000, 65535
-PORTS_TRIED = 100
 
 FILES = {
     "/": ("text/html; charset=utf-8", "kinarm.viewer", "live_page.html"),
@@ -46,7 +44,7 @@ class LiveServer(ThreadingTCPServer):
     """Serves a scene to browsers on this machine while it is drawn; for a ``with`` block.
 
     One draws on its ``window``. A thread answers each visitor until the process ends. The attribute
-    ``port`` tells which is used, the wanted or the next free one; an OutputError says if none is.
+    ``port`` tells which is used, the wanted or any free one; an OutputError says if none is.
     """
 
     allow_reuse_address = daemon_threads = True
@@ -54,19 +52,16 @@ class LiveServer(ThreadingTCPServer):
     def __init__(self, port: int = PORT) -> None:
         self.scene = DrawnScene()
         self.window = self.scene.window
-        first = whole_number("port", port, 0, LAST_PORT)
-        for candidate in range(first, min(first + PORTS_TRIED, LAST_PORT) + 1):
+        for wanted in (whole_number("port", port, 0, LAST_PORT), 0):
             try:
-                super().__init__((HOST, candidate), _Visit)
+                super().__init__((HOST, wanted), _Visit)
+                break
             except OSError as error:
                 reason = error.strerror
-                if error.errno != errno.EADDRINUSE:
-                    break
-            else:
-                self.port: int = self.server_address[1]
-                threading.Thread(target=self.serve_forever, args=(0.05,), daemon=True).start()
-                return
-        raise OutputError(f"cannot serve on port {first}: {reason}")
+        else:
+            raise OutputError(f"cannot serve on port {port}: {reason}")
+        self.port: int = self.server_address[1]
+        threading.Thread(target=self.serve_forever, args=(0.05,), daemon=True).start()
 
     @property
     def address(self) -> str:
@@ -75,7 +70,6 @@ class LiveServer(ThreadingTCPServer):
 
     def close(self) -> None:
         """Stop serving."""
-        self.scene.close()
         self.shutdown()
         self.server_close()
 
@@ -89,13 +83,13 @@ class LiveServer(ThreadingTCPServer):
 
 
 class _Visit(BaseHTTPRequestHandler):
-    """Answers with a file of the page, or streams the scene."""
+    """Answers with a file of the page, or with news of the scene, ``/scene?`` a number."""
 
     server: LiveServer
 
     def do_GET(self) -> None:
         """Answer."""
-        address = self.path.partition("?")[0]
+        address, _, since = self.path.partition("?")
         if address not in FILES:
             self.send_error(404)
             return
@@ -104,9 +98,10 @@ class _Visit(BaseHTTPRequestHandler):
         self.send_header("Content-Type", kind)
         self.send_header("Cache-Control", "no-store")
         self.end_headers()
-        content = (resources.files(package) / name).read_bytes() if name else None
-        for piece in [content] if content else self.server.scene.changes():
-            self.wfile.write(piece)
+        if name:
+            self.wfile.write((resources.files(package) / name).read_bytes())
+        else:
+            self.wfile.write(self.server.scene.news(int(since) if since.isdecimal() else 0))
 
     def log_message(self, *_: Any) -> None:
         """Say nothing about requests."""

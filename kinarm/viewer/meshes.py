@@ -189,19 +189,13 @@ def tube(points: ArrayLike, radius: float, sides: int = 6) -> Mesh:
     """
     middle = np.asarray(points, dtype=float)
     forward = np.gradient(middle, axis=0)
-    lengths = np.linalg.norm(forward, axis=1)
-    moving = np.flatnonzero(lengths > 1e-9)
-    if moving.size:
-        known = moving[np.maximum(np.searchsorted(moving, np.arange(len(middle)), "right") - 1, 0)]
-        forward = forward[known] / lengths[known, None]
-    across = np.zeros_like(middle)
-    side = np.cross(forward[0], [0.31, 0.83, 0.47])
-    for k, direction in enumerate(forward):
-        side = side - (side @ direction) * direction
-        side = side / max(float(np.linalg.norm(side)), 1e-12)
-        across[k] = side
+    across = np.cross(forward, [0.31, 0.83, 0.47])
+    beside = np.cross(forward, across)
+    across, beside = (
+        each / np.linalg.norm(each, axis=1, keepdims=True).clip(1e-12) for each in (across, beside)
+    )
     angle = np.linspace(0, 2 * np.pi, sides, endpoint=False)[:, None, None]
-    around = np.cos(angle) * across + np.sin(angle) * np.cross(forward, across)
+    around = np.cos(angle) * across + np.sin(angle) * beside
     return loft((middle + radius * around).transpose(1, 0, 2))
 
 

@@ -8,7 +8,7 @@ from typing import Any
 import coal
 import numpy as np
 import pinocchio as pin
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from kinarm.arm import Arm
 from kinarm.arm_specification import ArmSpecification
@@ -16,8 +16,8 @@ from kinarm.body_motion import BodyMotion
 from kinarm.collision import ContactModel
 from kinarm.enclosures import core
 from kinarm.errors import InvalidInputError
-from kinarm.problem import ProblemLike, ReachProblem
-from kinarm.recording import Recording, record_path
+from kinarm.problem import ReachProblem
+from kinarm.recording import Recording
 from kinarm.scene import Scene
 from kinarm.viewer.camera import stage_scale
 from kinarm.viewer.drawing import (
@@ -32,7 +32,6 @@ from kinarm.viewer.drawing import (
 from kinarm.viewer.html_page import HtmlPage, page_html
 from kinarm.viewer.parts import PAGE_COLOURS, TRACE_SIDES, goal_pose
 from kinarm.viewer.visual_shapes import arm_parts, collision_parts, link_joints
-from kinarm.world import World
 
 NEARER = 0.8
 """Camera's distance from an arm alone, as a share of that in replays."""
@@ -84,10 +83,6 @@ def contact_data(model: ContactModel) -> dict[str, Any]:
     }
 
 
-class ReplayPage(HtmlPage):
-    """A page that plays recordings. A notebook shows it."""
-
-
 def replay_page(
     recordings: Recording | Sequence[Recording],
     path: str | Path | None = None,
@@ -95,7 +90,7 @@ def replay_page(
     ghosts: Sequence[Recording] = (),
     groups: Sequence[str] = (),
     heading: str = "",
-) -> ReplayPage:
+) -> HtmlPage:
     """Make a page that plays recordings; the same recordings make the same page.
 
     Parameters
@@ -151,30 +146,10 @@ def replay_page(
     }
     title = f"{' and '.join(policies)} · kinarm replay"
     scripts = ("replay_stage", "trial_list", "player")
-    page = ReplayPage(page_html("player", title, drawn.content, data, scripts))
+    page = HtmlPage(page_html("player", title, drawn.content, data, scripts))
     if path is not None:
         page.save(path)
     return page
-
-
-def replay_path(
-    problem: ProblemLike | World,
-    path: ArrayLike,
-    file: str | Path | None = None,
-    *,
-    goal: ArrayLike | None = None,
-    name: str = "path",
-) -> ReplayPage:
-    """Make a page that plays your own path up to its contact, if any.
-
-    Parameters
-    ----------
-    problem, path, goal, name
-        As for `kinarm.record_path`.
-    file : str or Path, optional
-        Where to write the page, if at all.
-    """
-    return replay_page(record_path(problem, path, goal=goal, name=name), file)
 
 
 def _check_recordings(recordings: Sequence[Recording], ghosts: Sequence[Recording]) -> None:
@@ -190,11 +165,7 @@ def _check_recordings(recordings: Sequence[Recording], ghosts: Sequence[Recordin
             )
         if problem.scene != first.scene:
             raise InvalidInputError("the recordings were made in different scenes")
-    if ghosts and len(ghosts) != len(recordings):
-        raise InvalidInputError(
-            f"there must be a ghost for each recording: {len(ghosts)} for {len(recordings)}"
-        )
-    for recording, ghost in zip(recordings, ghosts, strict=False):
+    for recording, ghost in zip(recordings, ghosts, strict=bool(ghosts)):
         if not recording.same_trial(ghost):
             raise InvalidInputError(
                 f"trial {recording.trial} of {recording.policy!r} and trial {ghost.trial} of "
@@ -236,16 +207,12 @@ def _placed(problem: ReachProblem, goal: NDArray[np.float64]) -> list[float]:
     return [*pose[:3, 3].tolist(), *pin.Quaternion(pose[:3, :3]).coeffs().tolist()]
 
 
-class ArmPage(HtmlPage):
-    """A page on which an arm can be moved. A notebook shows it."""
-
-
 def arm_page(
     arm: Arm | ArmSpecification | str | Path,
     path: str | Path | None = None,
     *,
     scene: Scene = BARE_GROUND,
-) -> ArmPage:
+) -> HtmlPage:
     """Make a page with a slider for each joint of an arm, which shows contact.
 
     In the browser, the page tests the same pairs of shapes as the simulator.
@@ -277,7 +244,7 @@ def arm_page(
     data["scale"] *= NEARER
     title = f"{arm.name} · kinarm arm"
     scripts = ("kinematics", "contact", "arm_page")
-    page = ArmPage(page_html("arm_page", title, drawn.content, data, scripts))
+    page = HtmlPage(page_html("arm_page", title, drawn.content, data, scripts))
     if path is not None:
         page.save(path)
     return page

@@ -75,9 +75,7 @@ def play_page(
 def _check_playable(world: World) -> None:
     """Refuse a world with more than a page plays."""
     problem, goal = world.problem, world.problem.task.goal
-    plant = replace(
-        problem.plant, delay=0, bandwidth=0.0, damping=1.0, order=2, feedback="measured"
-    )
+    plant = replace(problem.plant, delay=0, bandwidth=0.0, damping=1.0, feedback="measured")
     ranges = any(isinstance(value, tuple) for value in vars(problem.plant).values())
     for wrong, reason in (
         (problem.scene.random_bodies, "random bodies"),

@@ -20,7 +20,7 @@ from kinarm.errors import UnknownNameError, finite_array, whole_number
 from kinarm.kernels.compiling import Array
 from kinarm.problem import ProblemLike, ReachProblem
 from kinarm.recording import OUTCOMES
-from kinarm.viewer.camera import Camera, CameraLike, stage_scale
+from kinarm.viewer.camera import Camera, stage_scale
 from kinarm.viewer.canvas import NEAR, Layer, draw
 from kinarm.viewer.meshes import Mesh, capsule, lathe, tube
 from kinarm.viewer.parts import (
@@ -96,12 +96,12 @@ class Renderer:
     problem, width, height
         The problem, and the size of pictures [pixels].
     camera : Camera, optional
-        The camera, or its values; as on the replay page by default.
+        The camera; as on the replay page by default.
 
     Raises
     ------
     InvalidInputError
-        If the size or the camera cannot be used.
+        If the size cannot be used.
     """
 
     def __init__(
@@ -110,13 +110,13 @@ class Renderer:
         *,
         width: int = 480,
         height: int = 360,
-        camera: CameraLike | None = None,
+        camera: Camera | None = None,
     ) -> None:
         self.problem = ReachProblem.load(problem)
         self.width = whole_number("width", width, 1)
         self.height = whole_number("height", height, 1)
         arm, scene = self.problem.load_arm(), self.problem.scene
-        self.camera = Camera.checked(camera or Camera.of_replays(self.problem, arm))
+        self.camera = camera or Camera.of_replays(self.problem, arm)
         self._arm, self._data, self._links = arm, arm.model.createData(), link_joints(arm)
         self._scale = stage_scale(arm, scene)
         placed = scene.bodies[: len(scene.obstacles)]

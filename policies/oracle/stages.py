@@ -53,7 +53,7 @@ def stages_of(simulator: Simulator, starts: Array, goals: Array) -> list[Stage]:
     drawn, stages = simulator.reset(starts, goals).pursuit.goals, []
     for number in range(goal.sequence):
         walks = None
-        if goal.motion is not None or goal.wander is not None:
+        if goal.motion is not None:
             walks = np.empty((len(goals), simulator.task.horizon + 1, goals.shape[1]))
             follow_goals(rules, drawn, number, walks)
         stages.append(Stage(drawn[:, number].copy(), walks))

@@ -50,8 +50,7 @@ def sb3_vec_env(
     render_mode, width, height, camera
         As for `kinarm.ReachEnv`.
     **overrides
-        As for `kinarm.ReachProblem.replace`: ``horizon``, ``reward`` ...; and
-        ``extra_observation``, as for `kinarm.ReachEnv`.
+        As for `kinarm.ReachProblem.replace`: ``horizon``, ``reward`` ...
 
     Raises
     ------

@@ -118,7 +118,7 @@ class SB3VecEnv(VecEnv):
                 "distance": episodes.distance,
                 **result.told,
             }
-            finals = one_by_one(env.interface.show(episodes, ended), ended.size)
+            finals = one_by_one(env.interface.observe(episodes.observation[ended]), ended.size)
             elapsed = round(time.time() - self._made, 6)
             for row, final in zip(ended.tolist(), finals, strict=True):
                 total, length = self._returns[row].item(), episodes.steps[row].item()
@@ -130,14 +130,14 @@ class SB3VecEnv(VecEnv):
                 }
             env._begin(ended)
             self._note_begun(ended)
-        return env.interface.show(episodes), rewards.astype(np.float32), dones, infos
+        shown = env.interface.observe(episodes.observation)
+        return shown, rewards.astype(np.float32), dones, infos
 
     def render(self, mode: str | None = None) -> Any:
         """Draw all arms side by side; see `kinarm.ReachVectorEnv`."""
-        shown = self.env.render()
-        if self.render_mode is None or mode not in (None, self.render_mode):
-            return super().render(mode)
-        return shown and shown.tiled
+        _ = self.episodes  # refuses if there are none
+        live = self.render_mode == "human" and mode in (None, "human")
+        return None if live else super().render(mode)
 
     def get_images(self) -> list[NDArray[np.uint8] | None]:
         """One picture of each arm, shape (height, width, 3), for ``rgb_array``."""

@@ -109,7 +109,7 @@ class ReferenceSimulator:
         positions = begun + self._problem.body_offsets(np.arange(self.task.horizon + 1))
         q, reward, spec = np.array(start), self.task.reward, self.task.goal
         goals = [goal]
-        if spec.count(self.task.horizon):
+        if spec.changes:
             goals = list(draw_followers(self._world, start[None], goal[None])[0])
         held, reached, limit = 0, 0, np.inf
         if spec.speed is not None:
@@ -168,15 +168,6 @@ class ReferenceSimulator:
     def _goal_at(self, goals: list[Array], step: int, reached: int) -> Array:
         """The goal after so many steps and goals reached, shape (goal_width,)."""
         spec = self.task.goal
-        if spec.wander is not None:
-            number, passed = divmod(step, spec.wander)
-            start, end = goals[number], goals[number + 1].copy()
-            if spec.kind == "pose" and start[3:] @ end[3:] < 0:
-                start = np.concatenate([start[:3], -start[3:]])
-            goal = start + passed / spec.wander * (end - start)
-            if spec.number:
-                goal[3:] /= np.linalg.norm(goal[3:])
-            return goal
         goal = goals[min(reached, spec.sequence - 1)].copy()
         if spec.motion is not None:
             goal[:3] += spec.motion.offsets(np.array([step * self._problem.stepping.time_step]))[0]

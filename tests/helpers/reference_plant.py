@@ -24,7 +24,7 @@ class ReferencePlant:
         self._arm, self._limit = world.arm, world.rules.step_limit
         n = len(self._limit)
         self._commanded = world.rules.commanded == 1
-        self._velocity, self._change = np.zeros(n), np.zeros(n)
+        self._velocity = np.zeros(n)
         self._numbers = numbers = np.zeros(0)
         self._calibration = self._bias = np.zeros(n)
         if world.plants.width:
@@ -52,29 +52,22 @@ class ReferencePlant:
 
     def _moved_joint(self, axis: int, start: float, told: float) -> float:
         servo = self._numbers[SERVO : SERVO + 4].reshape(2, 2)
-        most_change, trapeze, brake, jerk, ease = self._numbers[MOST_CHANGE:RATE]
+        most_change, trapeze = self._numbers[MOST_CHANGE:RATE]
         q, part, limit = start, self._part, self._limit[axis]
         lower, upper = self._arm.lower[axis], self._arm.upper[axis]
         for _ in range(SUBSTEPS):
-            velocity, former = self._velocity[axis], self._change[axis]
+            velocity = self._velocity[axis]
             exact = told + servo[0] @ (q - told, velocity)
             error = q - told
             wanted, most = servo[1] @ (error, velocity), limit / (SUBSTEPS * part)
             free = wanted - velocity
-            if brake > 0:
-                half = brake / 2 + ease
-                most = min(most, (np.sqrt(half**2 + 2 * brake * abs(error)) - half) / part)
             change = np.clip(wanted, -most, most) - velocity
             change = np.clip(change, -most_change, most_change)
-            if jerk > 0:
-                ends = np.sqrt(jerk**2 / 4 + 2 * jerk * abs(change)) - jerk / 2
-                change = np.clip(np.clip(change, -ends, ends), former - jerk, former + jerk)
-            self._change[axis] = change
             self._velocity[axis] += change
             way = part * (self._velocity[axis] - trapeze * change)
             q = np.clip(exact if change == free else q + way, lower, upper)
             if not lower < q < upper:
-                self._velocity[axis] = self._change[axis] = 0.0
+                self._velocity[axis] = 0.0
         return float(np.clip(q, start - limit, start + limit))
 
     def seen(self, q: Array, goal: Array, step: int) -> tuple[Array, Array]:

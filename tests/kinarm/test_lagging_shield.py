@@ -14,8 +14,7 @@ from tests.helpers.reference_plant import ReferencePlant
 PLANTS = {
     "hard": "hard",
     "slow": Plant(bandwidth=(2.0, 8.0), damping=(0.3, 2.0), calibration=0.05, delay=(0, 3)),
-    "first order": Plant(order=1, bandwidth=(2.0, 20.0), acceleration=(20.0, 200.0)),
-    "profile": Plant(acceleration=(50.0, 200.0), jerk=(1e3, 2e4), resolution=0.01),
+    "weak": Plant(bandwidth=(2.0, 20.0), acceleration=(20.0, 200.0), resolution=0.01),
     "late": Plant(delay=2, feedback="commanded"),
 }
 

