@@ -98,16 +98,24 @@ def read_robot(path: Path) -> Element:
     for joint in robot.findall("joint"):
         _check_joint(joint, f"joint {joint.get('name')!r}")
     for link in robot.findall("link"):
-        where = f"link {link.get('name')!r}"
-        for collision in link.findall("collision"):
-            geometry = collision.find("geometry")
-            if geometry is None or not len(geometry) or geometry[0].tag not in SHAPES:
-                kinds = ", ".join(SHAPES)
-                raise ArmError(f"{where} needs a shape of {kinds} in each collision element")
-            geometry[1:] = []
-            for element in (geometry[0], *collision.findall("origin")):
-                check_numbers(element, f"a shape of {where}")
+        check_shapes(link, "collision")
     return robot
+
+
+def check_shapes(link: Element, use: str) -> None:
+    """Check a link's shapes for a use, ``collision`` or ``visual``, and rewrite their numbers.
+
+    Raises ArmError if a shape is missing or unknown, or a number is out of range.
+    """
+    where = f"link {link.get('name')!r}"
+    for element in link.findall(use):
+        geometry = element.find("geometry")
+        if geometry is None or not len(geometry) or geometry[0].tag not in SHAPES:
+            kinds = ", ".join(SHAPES)
+            raise ArmError(f"{where} needs a shape of {kinds} in each {use} element")
+        geometry[1:] = []
+        for part in (geometry[0], *element.findall("origin")):
+            check_numbers(part, f"a shape of {where}")
 
 
 def _check_joint(joint: Element, where: str) -> None:

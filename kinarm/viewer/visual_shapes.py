@@ -5,7 +5,7 @@ Meshes are painted, simplified triangles; a file is read once, then cached.
 
 import json
 import logging
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from functools import cache, lru_cache
 from importlib import metadata
 from pathlib import Path
@@ -23,19 +23,11 @@ from kinarm.arm import Arm
 from kinarm.contact_pairs import body_names
 from kinarm.errors import ArmError, KinarmError, MissingExtraError
 from kinarm.meshes import mesh_content
-from kinarm.urdf_tree import FARTHEST, check_numbers
+from kinarm.urdf_tree import FARTHEST, check_numbers, check_shapes
 from kinarm.viewer.meshes import Mesh, box, capsule, cylinder, from_coal, housing, lathe, plate
 from kinarm.viewer.parts import FINISHES, PLAIN, ArmPart, packed_colour, shape_finish
 
 Element = ElementTree.Element
-
-SIZES = {
-    "box": (("size",), coal.Box),
-    "sphere": (("radius",), coal.Sphere),
-    "cylinder": (("radius", "length"), coal.Cylinder),
-    "capsule": (("radius", "length"), coal.Capsule),
-}
-"""Attributes with sizes of visual shapes, and the shapes."""
 
 SHAPES = {shape.__name__: shape for shape in (box, capsule, cylinder, housing, lathe, plate)}
 """Shapes of parts in ``industrial_arm.toml``."""
@@ -155,58 +147,47 @@ def link_joints(arm: Arm) -> dict[str, int]:
 
 
 def visual_parts(arm: Arm) -> Iterator[ArmPart]:
-    """Visual shapes of an arm's URDF, simplified where they are meshes.
+    """Visual shapes of an arm's URDF where Pinocchio puts them, simplified where they are meshes.
 
     A mesh of several colours keeps them; else the URDF's colour takes precedence. Raises
     KinarmError if a shape is damaged or needs the missing extra ``robots``.
     """
     robot = ElementTree.fromstring(arm.description.text)
-    named: dict[str | None, int] = {}
-    for material in robot.iter("material"):
-        if (colour := _stated_colour(material)) is not None:
-            named.setdefault(material.get("name"), colour)
+    robot.attrib = {"name": "robot", "version": "1.2"}
+    named = {look.get("name"): look for look in reversed(robot.findall(".//material[color]"))}
+    stated, meshes = dict[str, int | None](), dict[str, tuple[PaintedMesh, ...]]()
     for link in robot.findall("link"):
-        frame = arm.model.frames[arm.model.getFrameId(link.get("name"), pin.FrameType.BODY)]
-        for visual in link.findall("visual"):
-            origin = visual.find("origin")
-            origin = Element("origin") if origin is None else origin
-            turn = pin.rpy.rpyToMatrix(np.array(_numbers(origin, "rpy")))
-            placement = frame.placement * pin.SE3(turn, np.array(_numbers(origin, "xyz")))
-            look, stated = visual.find("material"), None
-            if look is not None and (stated := _stated_colour(look)) is None:
-                stated = named.get(look.get("name"))
-            pieces = _shapes(visual, arm.description.path.name)
-            if stated is not None and len({piece.colour for piece in pieces}) == 1:
-                pieces = tuple(piece._replace(colour=stated) for piece in pieces)
-            for mesh, colour in pieces:
-                yield _placed_part(frame.parentJoint, colour, mesh, placement)
+        check_shapes(link, "visual")
+        for number, visual in enumerate(link.findall("visual")):
+            name, mesh = f"{link.get('name')}_{number}", visual.find("geometry/mesh")
+            stated[name] = _stated_colour(visual, named)
+            if mesh is not None:
+                scale = tuple(map(float, mesh.attrib["scale"].split()))
+                meshes[name] = read_mesh_file(Path(mesh.get("filename", "")), scale)
+                mesh.tag, mesh.attrib = "sphere", {"radius": "1"}
+    for parent in (robot, *robot.iter("visual")):
+        for look in parent.findall("material"):  # about which Pinocchio may print errors
+            parent.remove(look)
+    text = ElementTree.tostring(robot, "unicode")
+    geometry = pin.buildGeomFromUrdfString(arm.model, text, pin.GeometryType.VISUAL)
+    for shape in geometry.geometryObjects:
+        pieces = meshes.get(shape.name) or [PaintedMesh(from_coal(shape.geometry), None)]
+        whole = stated[shape.name] if len({piece.colour for piece in pieces}) == 1 else None
+        for piece in pieces:
+            colour = piece.colour if whole is None else whole
+            yield _placed_part(shape.parentJoint, colour, piece.mesh, shape.placement)
 
 
-def _shapes(visual: Element, file: str) -> tuple[PaintedMesh, ...]:
-    """Shapes of a visual element of a file, in its frame."""
-    geometry, where = visual.find("geometry"), f"a visual shape of {file}"
-    shape = None if geometry is None else next(iter(geometry), None)
-    if shape is None:
-        raise ArmError(f"{file} has a visual shape without geometry")
-    if shape.tag == "mesh":
-        return read_mesh_file(Path(shape.get("filename", "")), _numbers(shape, "scale", where))
-    if shape.tag not in SIZES:
-        raise ArmError(f"{file} has a visual shape <{shape.tag}>: not supported")
-    names, kind = SIZES[shape.tag]
-    solid = kind(*(size for name in names for size in _numbers(shape, name, where)))
-    return (PaintedMesh(from_coal(solid), None),)
-
-
-def _stated_colour(material: Element) -> int | None:
-    """Colour of a material as 0xRRGGBB, if it is defined here."""
-    colour = material.find("color")
-    return None if colour is None else packed_colour(_numbers(colour, "rgba")[:3])
-
-
-def _numbers(element: Element, name: str, where: str = "a visual shape") -> tuple[float, ...]:
-    """Checked numbers of an attribute."""
-    check_numbers(element, where)
-    return tuple(float(word) for word in element.get(name, "").split())
+def _stated_colour(visual: Element, named: Mapping[str | None, Element]) -> int | None:
+    """Colour of a visual shape's material as 0xRRGGBB, or of the one of its name, or None."""
+    look = visual.find("material")
+    if look is not None and look.find("color") is None:
+        look = named.get(look.get("name"))
+    colour = None if look is None else look.find("color")
+    if colour is None:
+        return None
+    check_numbers(colour, "a visual shape")
+    return packed_colour([float(word) for word in colour.attrib["rgba"].split()[:3]])
 
 
 def read_mesh_file(path: Path, scale: Sequence[float]) -> tuple[PaintedMesh, ...]:
@@ -253,7 +234,11 @@ def _simplified_arrays(path: Path, scale: Sequence[float]) -> dict[str, ArrayLik
 
 @np.errstate(all="ignore")  # what is not finite is refused at its end
 def _pieces(path: Path, scale: Sequence[float]) -> list[PaintedMesh]:
-    """Triangles of a file by node and material."""
+    """Triangles of a file by node and material.
+
+    Coal 3, through which Pinocchio reads meshes, joins wrong vertices in the triangles of a Collada
+    node that has several materials, or nodes within.
+    """
     import trimesh
 
     try:
