@@ -91,7 +91,7 @@ class Protocol(Document, frozen=True, kw_only=True):
         Git.
     """
 
-    format_version: Literal[4] = 4
+    format_version: Literal[5] = 5
     command: str
     trials: Count
     seed: Count

@@ -4,9 +4,8 @@ For each trial it *proves* bounds and *finds* a motion; the best policy lies
 between them.
 
 Proven, by branch and bound over all configurations within reach: the fewest
-steps in which any policy can bring the tool within the tolerance of the goal;
-and, where none can within the horizon, a distance that no policy can beat, to a
-millimetre if the budget suffices. Both ignore contact, and hold with it all the
+steps in which any policy can bring the tool within the tolerance of the goal, or
+that none can within the horizon. This ignores contact, and holds with it all the
 more. Where the motion found is slower, contact raises the bound: no motion ends
 where the arm touches something, as far as its shapes are capsules. Boxes and
 distances are enlarged by 1e-9 to cover rounding. When a budget runs out, what
@@ -35,14 +34,13 @@ from kinarm.errors import (
 from kinarm.kernels.compiling import Array
 from kinarm.plant import Plant
 from kinarm.policies.oracle.bounding import Prover
-from kinarm.policies.oracle.inverse import step_box
 from kinarm.policies.oracle.motion_search import MotionSearch
 from kinarm.policies.oracle.solutions import OracleSolution, OracleSolutions
 from kinarm.policies.oracle.stages import Stage, stages_of
 from kinarm.problem import ProblemLike
 from kinarm.simulator import Simulator
 
-ORACLE_SEMANTICS = "4"
+ORACLE_SEMANTICS = "5"
 """Version of the oracle's results: raised when they change."""
 
 EXTRA_STEPS = 24
@@ -143,35 +141,28 @@ class Oracle:
         search = MotionSearch(self._single, starts, stages[0])
         arrivals, complete = self._search(search)
         self._count_contact(search, arrivals, complete)
-        distance_bounds = self._approach(search, arrivals)
+        search.try_approach(np.flatnonzero(~search.reached))
         for before, stage in pairwise(stages):
             fewest = arrivals + self._rest + self._prover.steps_apart(before, stage)
             trials = (starts, stage.targets, starts.copy(), np.arange(len(starts)))
             arrivals, complete = self._prover.bound_steps(*trials, fewest, search.left)
-            complete, distance_bounds = complete & (arrivals > self._last), 0.0 * distance_bounds
+            complete &= arrivals > self._last
         steps_bounds = np.where(arrivals > self._last, horizon + 1, arrivals + self._rest)
         actions = self._follow(search, stages)
         replay = self.simulator.rollout_actions(actions, starts, goals, record=True)
         # A motion that was to come close may reach the goal all the same.
-        distance_bounds[replay.success] = 0.0
         complete |= replay.success & (replay.steps == steps_bounds)
         no_motion = f"no contact-free motion of {horizon} steps or less found"
         no_end = "no contact-free configuration at the goal found"
         reasons = [no_motion if steps <= self._last else no_end for steps in search.solved]
         for row in np.flatnonzero(steps_bounds > horizon):
-            away = (
-                f"proven to stay {distance_bounds[row]:.3f} m away or more within {horizon} steps"
-            )
-            if not self.simulator.task.goal.plain:
-                away = f"proven for all motions of {horizon} steps"
-            reasons[row] = f"out of reach: {away}"
+            reasons[row] = f"out of reach: proven for all motions of {horizon} steps"
         return OracleSolutions(
             reachable=replay.success,
             proof_complete=complete,
             steps=replay.steps,
             steps_lower_bound=steps_bounds,
             final_distance=replay.distance,
-            distance_lower_bound=distance_bounds,
             actions=actions,
             paths=replay.paths,
             reasons=np.array(np.where(replay.success, "", reasons), dtype=np.str_),
@@ -230,18 +221,3 @@ class Oracle:
         complete[~search.reached & (steps_bounds <= self._last)] = False
         shut = blocked[beyond > self._last]
         steps_bounds[shut], complete[shut] = self._last + 1, True
-
-    def _approach(self, search: MotionSearch, steps_bounds: NDArray[np.int64]) -> Array:
-        """Prove, and seek, how close motions come to goals that none reaches."""
-        task, missed = self.simulator.task, np.flatnonzero(~search.reached)
-        starts, goals = search.starts[missed], search.stage.goals[missed]
-        box = step_box(self.simulator, starts, np.full(missed.size, task.horizon))
-        distances = np.zeros(len(steps_bounds))
-        if search.stage.walks is None:
-            proven, search.witnesses[missed] = self._prover.bound_distance(starts, goals, box)
-            distances[missed] = proven[:, 0]
-        if task.goal.plain:
-            out_of_reach = steps_bounds > task.horizon
-            distances[out_of_reach] = np.fmax(distances[out_of_reach], task.tolerance)
-        search.try_approach(missed, np.fmax(distances[missed], task.tolerance))
-        return distances

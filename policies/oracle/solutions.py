@@ -27,9 +27,6 @@ class OracleSolution:
         ``steps`` larger.
     final_distance : float
         Distance from tool to goal at the end of the motion [m].
-    distance_lower_bound : float
-        Proven: no motion within the horizon ends closer [m]. Zero if one
-        reaches the goal, or the goal moves or is one of a sequence.
     path : ndarray, shape (steps + 1, n_joints)
         Configurations of the motion in the simulator [rad or m].
     actions : ndarray, shape (steps, n_actions)
@@ -43,13 +40,12 @@ class OracleSolution:
     steps_lower_bound: int
     proof_complete: bool
     final_distance: float
-    distance_lower_bound: float
     path: NDArray[np.float64]
     actions: NDArray[np.float64]
     reason: str | None
 
 
-NUMBERS = [item.name for item in fields(OracleSolution)][:6]
+NUMBERS = [item.name for item in fields(OracleSolution)][:5]
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,7 +69,6 @@ class OracleSolutions:
     steps: NDArray[np.int64]
     steps_lower_bound: NDArray[np.int64]
     final_distance: NDArray[np.float64]
-    distance_lower_bound: NDArray[np.float64]
     actions: NDArray[np.float64]
     paths: NDArray[np.float64]
     reasons: NDArray[np.str_]

@@ -76,7 +76,6 @@ def test_nobody_is_better_than_proven_possible(arm, name, task):
     evaluation = evaluate(name, task, trials=25, seed=2, arm=arm, oracle=True)
     assert (outcomes_of((evaluation,)).step_ratio >= 1).all()
     rollouts, bounds = evaluation.rollouts, evaluation.bounds
-    assert (rollouts.distance >= bounds.distance_lower_bound).all()
     assert not rollouts.success[bounds.steps_lower_bound > 64].any()
 
 

@@ -21,15 +21,6 @@ def prove_steps(simulator, starts, goals, *, fewest=1, most=None, **settings):
     return *found, witnesses
 
 
-def prove_distance(simulator, starts, goals, box=None, **settings):
-    """Distances proven and found, and where they were found."""
-    arm, moved = simulator.arm, slice(simulator.n_actions)
-    whole = tuple(np.tile(limit[moved], (len(starts), 1)) for limit in (arm.lower, arm.upper))
-    prover = Prover(simulator)
-    distances, configurations = prover.bound_distance(starts, goals, box or whole, **settings)
-    return *distances.T, configurations
-
-
 def aims_at(simulator, goals):
     """What goals ask for, whatever joints that are not actuated do."""
     return Aims.of(simulator, np.zeros((len(goals), simulator.arm.n_joints)), goals, 0.0)
