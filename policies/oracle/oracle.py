@@ -27,15 +27,12 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from kinarm.errors import (
-    finite_array,
-    one_or_many,
-)
+from kinarm.errors import one_or_many
 from kinarm.kernels.compiling import Array
 from kinarm.plant import Plant
 from kinarm.policies.oracle.bounding import Prover
 from kinarm.policies.oracle.motion_search import MotionSearch
-from kinarm.policies.oracle.solutions import OracleSolution, OracleSolutions
+from kinarm.policies.oracle.solutions import OracleSolutions
 from kinarm.policies.oracle.stages import Stage, stages_of
 from kinarm.problem import ProblemLike
 from kinarm.simulator import Simulator
@@ -78,16 +75,10 @@ class Oracle:
     def __repr__(self) -> str:
         return f"Oracle({self.simulator.problem!r})"
 
-    def solve(self, start: ArrayLike, goal: ArrayLike) -> OracleSolution:
-        """Solve one trial; see `solve_batch`."""
-        q = finite_array("start", start, (self.simulator.arm.n_joints,))
-        width = self.simulator.world.goal_width
-        return self.solve_batch(q[None], finite_array("goal", goal, (width,))[None])[0]
-
     def solve_batch(
         self, starts: ArrayLike, goals: ArrayLike, *, on_progress: Progress | None = None
     ) -> OracleSolutions:
-        """Solve many trials.
+        """Solve trials, one or many.
 
         Parameters
         ----------

@@ -23,8 +23,8 @@ def test_step_ratio_is_that_of_the_trials_that_succeeded(bounded):
     rollouts, starts, goals = bounded.rollouts, bounded.trials.starts, bounded.trials.goals
     solutions = Oracle("right").solve_batch(starts, goals)
     expected = [
-        rollouts.steps[trial] / solution.steps_lower_bound
-        for trial, solution in enumerate(solutions)
+        rollouts.steps[trial] / solutions.steps_lower_bound[trial]
+        for trial in range(len(solutions))
         if rollouts.success[trial]
     ]
     assert 0 < len(expected) < 60
