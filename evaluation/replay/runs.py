@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from kinarm._fields import to_plain
 from kinarm.evaluation.contestants import Contestant
 from kinarm.evaluation.trials import TrialSet
-from kinarm.policies.oracle.solutions import OracleSolutions
+from kinarm.policies.oracle import OracleSolutions
 from kinarm.policies.provenance import package_versions, source_commit
 from kinarm.recording import Recording, record_rollouts
 

@@ -10,9 +10,8 @@ from kinarm.chain import MotionBounds
 from kinarm.kernels.compiling import Array
 from kinarm.kernels.goals import CONFIGURATION, DIRECTION, POSE, errors_between
 from kinarm.kernels.records import recorded
-from kinarm.policies.oracle.aims import Aims
+from kinarm.policies.oracle.goals import Aims, Stage
 from kinarm.policies.oracle.kernels.approach import ROUNDING, WAITING, Boxes, layout, search
-from kinarm.policies.oracle.stages import Stage
 from kinarm.simulator import Simulator
 
 BUDGET = 100_000

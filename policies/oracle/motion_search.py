@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kinarm.kernels.compiling import Array
+from kinarm.policies.oracle.goals import Stage
 from kinarm.policies.oracle.inverse import Solutions, solve_within, step_box, steps_between
-from kinarm.policies.oracle.stages import Stage
 from kinarm.policies.planning.motions import Motions
 from kinarm.policies.planning.paths import find_path, on_path
 from kinarm.randomness import low_discrepancy_points

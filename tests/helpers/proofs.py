@@ -5,8 +5,8 @@ import pytest
 from simulators import changed
 
 from kinarm.kernels.records import recorded
-from kinarm.policies.oracle.aims import Aims
 from kinarm.policies.oracle.bounding import Prover
+from kinarm.policies.oracle.goals import Aims
 from kinarm.policies.oracle.kernels.projection import damped_least_squares, layout
 from kinarm.reference import ReferenceSimulator
 

@@ -11,8 +11,8 @@ from scipy.optimize import least_squares, minimize
 from kinarm import BodyMotion
 from kinarm.goals import GoalSpecification
 from kinarm.policies import Oracle
+from kinarm.policies.oracle.goals import stages_of
 from kinarm.policies.oracle.inverse import solve_within, step_box, steps_between
-from kinarm.policies.oracle.stages import stages_of
 from kinarm.problem import PROBLEMS
 from kinarm.simulator import Simulator
 
