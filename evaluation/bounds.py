@@ -71,9 +71,8 @@ class TrialBounds(Document, frozen=True, kw_only=True):
     ----------
     steps, steps_lower_bound : list of int
         Steps of the motion that was found, and steps proven necessary.
-    final_distance, distance_lower_bound : list of float
-        How close the motion comes, and no motion within the horizon comes
-        closer [m].
+    final_distance : list of float
+        How far from the goal the motion ends [m].
     """
 
     reachable: list[bool]
@@ -81,7 +80,6 @@ class TrialBounds(Document, frozen=True, kw_only=True):
     steps_lower_bound: list[Count]
     proof_complete: list[bool]
     final_distance: list[float]
-    distance_lower_bound: list[float]
 
 
 class Bounds(Document, frozen=True, kw_only=True):

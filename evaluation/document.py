@@ -15,7 +15,7 @@ from kinarm.evaluation.outcomes import Cause, Pair
 from kinarm.evaluation.schemas import Count, Digest, Document, Goal, Share
 from kinarm.evaluation.statistics import LEVEL, Estimate
 from kinarm.evaluation.trials import TrialSet
-from kinarm.policies.oracle.solutions import OracleSolutions
+from kinarm.policies.oracle import OracleSolutions
 from kinarm.problem import ReachProblem
 
 
@@ -91,7 +91,7 @@ class Protocol(Document, frozen=True, kw_only=True):
         Git.
     """
 
-    format_version: Literal[4] = 4
+    format_version: Literal[5] = 5
     command: str
     trials: Count
     seed: Count

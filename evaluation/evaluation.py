@@ -22,7 +22,7 @@ from kinarm.evaluation.predictors import Wrapper
 from kinarm.evaluation.statistics import Estimate
 from kinarm.evaluation.trials import TrialSet
 from kinarm.networks import PolicyFunction
-from kinarm.policies.oracle.solutions import OracleSolutions
+from kinarm.policies.oracle import OracleSolutions
 from kinarm.policies.policy import Policy
 from kinarm.problem import ProblemLike, ReachProblem
 

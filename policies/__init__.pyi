@@ -17,7 +17,6 @@ from .library import load_policy as load_policy
 from .library import policy_names as policy_names
 from .normalizer import Normalizer as Normalizer
 from .oracle import Oracle as Oracle
-from .oracle import OracleSolution as OracleSolution
 from .oracle import OracleSolutions as OracleSolutions
 from .planning.plans import Plan as Plan
 from .planning.plans import plan as plan

@@ -13,7 +13,7 @@ from kinarm.evaluation.finding import check_normalizing, find_contestants
 from kinarm.evaluation.outcomes import failure_causes
 from kinarm.evaluation.trials import TrialSet
 from kinarm.policies.library import BEST
-from kinarm.policies.oracle.solutions import OracleSolutions
+from kinarm.policies.oracle import OracleSolutions
 from kinarm.policies.provenance import package_versions, source_commit
 from kinarm.problem import ReachProblem
 from kinarm.recording import Recording, load_recordings, record_rollouts

@@ -2,6 +2,5 @@
 
 from kinarm.policies.oracle.oracle import ORACLE_SEMANTICS as ORACLE_SEMANTICS
 from kinarm.policies.oracle.oracle import Oracle as Oracle
+from kinarm.policies.oracle.oracle import OracleSolutions as OracleSolutions
 from kinarm.policies.oracle.oracle import Progress as Progress
-from kinarm.policies.oracle.solutions import OracleSolution as OracleSolution
-from kinarm.policies.oracle.solutions import OracleSolutions as OracleSolutions

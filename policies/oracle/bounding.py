@@ -1,4 +1,4 @@
-"""Proven bounds of steps and distances for batches of trials."""
+"""Proven bounds of steps for batches of trials."""
 
 from functools import partial
 
@@ -10,18 +10,12 @@ from kinarm.chain import MotionBounds
 from kinarm.kernels.compiling import Array
 from kinarm.kernels.goals import CONFIGURATION, DIRECTION, POSE, errors_between
 from kinarm.kernels.records import recorded
-from kinarm.policies.oracle.aims import Aims
+from kinarm.policies.oracle.goals import Aims, Stage
 from kinarm.policies.oracle.kernels.approach import ROUNDING, WAITING, Boxes, layout, search
-from kinarm.policies.oracle.kernels.rotation import Turn
-from kinarm.policies.oracle.stages import Stage
 from kinarm.simulator import Simulator
 
 BUDGET = 100_000
 """Boxes that a proof may examine per number of steps."""
-
-RESOLUTION = 1e-3
-"""How far a proven distance may be below the smallest one [m]."""
-
 
 SMALLEST = 1e-6
 """Share of a step, and move in one, that count as rounding [rad]."""
@@ -84,8 +78,8 @@ class Prover:
                 while few <= many:
                     limit = many if all_at_once else few
                     goal, turn, allowed = aims.of_row(i * n_times + min(few, n_times - 1))
-                    inputs = (start, goal, turn, allowed, limits, few, limit, tolerance, np.inf)
-                    complete, steps, _, _ = self._search(
+                    inputs = (start, goal, turn, allowed, limits, few, limit, tolerance)
+                    complete, steps = self._search(
                         *inputs, contact, budget, lower, upper, best, *space
                     )
                     if steps <= limit:
@@ -102,46 +96,6 @@ class Prover:
 
         run_rows(bound_some, n, BUDGET * n, simulator.threads)
         return lower_bounds, tight
-
-    def bound_distance(
-        self,
-        starts: Array,
-        goals: Array,
-        box: tuple[Array, Array],
-        *,
-        resolution: float = RESOLUTION,
-        budget: int = BUDGET,
-    ) -> tuple[Array, Array]:
-        """Bound how close the tool can come to goals, whatever it touches.
-
-        Returned are distances proven and found, shape (n, 2) [m], and
-        configurations. Of goals, only the positions count.
-
-        Parameters
-        ----------
-        starts, goals, budget
-            See `Prover`; joints that are not actuated stay.
-        box : tuple of ndarray, shape (n, n_actions)
-            Lower and upper corners of where the others can be [rad or m].
-        resolution : float
-            How far a proven distance may be below the smallest one [m].
-        """
-        n, n_moved = len(starts), self._simulator.n_actions
-        distances, configurations = np.empty((n, 2)), np.empty(starts.shape)
-
-        def bound_some(first: int, last: int) -> None:
-            unlimited, space = np.full(n_moved, np.inf), self._space(0)
-            nothing = np.empty((0, 3)), np.empty((0, 3)), 0.0, np.zeros(n_moved)
-            turn, allowed = recorded(Turn(*nothing)), np.empty((2, n_moved))
-            inputs = (turn, allowed, unlimited, n_moved, n_moved, 0.0, resolution, False, budget)
-            for row in range(first, last):
-                start, goal = starts[row].copy(), (*goals[row, :3].tolist(),)
-                corners = (box[0][row].copy(), box[1][row].copy(), configurations[row])
-                _, _, found, proven = self._search(start, goal, *inputs, *corners, *space)
-                distances[row] = proven, found
-
-        run_rows(bound_some, n, BUDGET * n, self._simulator.threads)
-        return distances, configurations
 
     def steps_apart(self, before: Stage, after: Stage) -> NDArray[np.int64]:
         """Fewest steps from anywhere at goals to others, shape (n,): at least one.
@@ -173,4 +127,4 @@ class Prover:
         """Space for boxes that wait and boxes that are examined, with axes of the tool."""
         n, n_joints = self._simulator.n_actions, self._simulator.arm.n_joints
         n_placed = len(self._simulator.world.contact_model.shapes.placed)
-        return np.empty((WAITING, 2 * n + 1)), layout(n, n_joints, n_placed, n_axes).record()
+        return np.empty((WAITING, 2 * n)), layout(n, n_joints, n_placed, n_axes).record()

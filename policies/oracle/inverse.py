@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from kinarm._parallel import run_rows
 from kinarm.kernels.compiling import Array
 from kinarm.kernels.records import recorded
-from kinarm.policies.oracle.aims import Aims
+from kinarm.policies.oracle.goals import Aims
 from kinarm.policies.oracle.kernels.projection import damped_least_squares, layout
 from kinarm.randomness import low_discrepancy_points
 from kinarm.simulator import Simulator

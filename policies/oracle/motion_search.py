@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kinarm.kernels.compiling import Array
+from kinarm.policies.oracle.goals import Stage
 from kinarm.policies.oracle.inverse import Solutions, solve_within, step_box, steps_between
-from kinarm.policies.oracle.stages import Stage
 from kinarm.policies.planning.motions import Motions
 from kinarm.policies.planning.paths import find_path, on_path
 from kinarm.randomness import low_discrepancy_points
@@ -23,8 +23,8 @@ BEGINNINGS, SEPARATION = 1024, 0.2
 """Configurations from which ends of detours are sought, and least difference of two in some joint
 [rad or m]."""
 
-APPROACHES = (0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5)
-"""Distances beyond the smallest possible one that are tried in turn [m]."""
+APPROACHES = (0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0)
+"""Distances beyond the tolerance that are tried in turn [m]."""
 
 MISS_COST = 1000.0
 """Cost of a contact-free miss, beside its final distance in metres."""
@@ -143,15 +143,15 @@ class MotionSearch:
             remaining = remaining[apart > SEPARATION]
         return np.array(distinct)
 
-    def try_approach(self, rows: NDArray[np.int64], distances: Array) -> None:
-        """Look for motions that end as close as possible to goals out of reach."""
-        for nearer in APPROACHES:
-            due = np.isinf(self.costs[rows])
-            rows, distances = rows[due], distances[due]
+    def try_approach(self, rows: NDArray[np.int64]) -> None:
+        """Look for motions that end close to goals that none reaches."""
+        for farther in APPROACHES:
+            rows = rows[np.isinf(self.costs[rows])]
             if rows.size == 0:
                 return
             steps = np.fmax(self.left[rows], 1)
-            solutions = self._try_straight(rows, steps, distances + nearer, SAMPLES[-1])
+            tolerances = np.full(rows.size, self.simulator.task.tolerance + farther)
+            solutions = self._try_straight(rows, steps, tolerances, SAMPLES[-1])
             due = np.isinf(self.costs[rows]) & (steps > 1)
             self._try_vias(rows, steps, solutions, np.flatnonzero(due))
 

@@ -4,9 +4,8 @@ For each trial it *proves* bounds and *finds* a motion; the best policy lies
 between them.
 
 Proven, by branch and bound over all configurations within reach: the fewest
-steps in which any policy can bring the tool within the tolerance of the goal;
-and, where none can within the horizon, a distance that no policy can beat, to a
-millimetre if the budget suffices. Both ignore contact, and hold with it all the
+steps in which any policy can bring the tool within the tolerance of the goal, or
+that none can within the horizon. This ignores contact, and holds with it all the
 more. Where the motion found is slower, contact raises the bound: no motion ends
 where the arm touches something, as far as its shapes are capsules. Boxes and
 distances are enlarged by 1e-9 to cover rounding. When a budget runs out, what
@@ -22,27 +21,22 @@ goal. It need not be the fastest, and finding none proves nothing.
 
 from collections.abc import Callable
 from copy import copy
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from kinarm.errors import (
-    finite_array,
-    one_or_many,
-)
+from kinarm.errors import one_or_many
 from kinarm.kernels.compiling import Array
 from kinarm.plant import Plant
 from kinarm.policies.oracle.bounding import Prover
-from kinarm.policies.oracle.inverse import step_box
+from kinarm.policies.oracle.goals import Stage, stages_of
 from kinarm.policies.oracle.motion_search import MotionSearch
-from kinarm.policies.oracle.solutions import OracleSolution, OracleSolutions
-from kinarm.policies.oracle.stages import Stage, stages_of
 from kinarm.problem import ProblemLike
 from kinarm.simulator import Simulator
 
-ORACLE_SEMANTICS = "4"
+ORACLE_SEMANTICS = "5"
 """Version of the oracle's results: raised when they change."""
 
 EXTRA_STEPS = 24
@@ -52,6 +46,60 @@ LOT = 128
 """Trials that are solved together."""
 
 Progress = Callable[[int, int], object]
+
+
+@dataclass(frozen=True, eq=False)
+class OracleSolutions:
+    """Bounds and motions of n trials.
+
+    Attributes
+    ----------
+    reachable : ndarray of bool, shape (n,)
+        Whether the motion reaches the goal in the simulator.
+    proof_complete : ndarray of bool, shape (n,)
+        Whether a configuration at the goal, not proven to touch anything, is
+        ``steps_lower_bound`` steps away, the motion takes as many, or the goal
+        is proven to be out of reach. Else the budget ran out. Contact on the way
+        may make ``steps`` larger.
+    steps : ndarray of int, shape (n,)
+        Steps of the motion; the horizon if it does not reach the goal.
+    steps_lower_bound : ndarray of int, shape (n,)
+        Proven: no motion reaches the goal in fewer steps. The horizon + 1 if it
+        is out of reach.
+    final_distance : ndarray, shape (n,)
+        Distance from tool to goal at the end of the motion [m].
+    actions : ndarray, shape (n, horizon, n_actions)
+        Actions of the motions as planned, of which some arrive sooner; then zero.
+    paths : ndarray, shape (n, horizon + 1, n_joints)
+        Configurations of the motions, NaN after their end [rad or m].
+    reasons : ndarray of str, shape (n,)
+        Why no motion reaches the goal; empty if one does.
+    """
+
+    reachable: NDArray[np.bool_]
+    proof_complete: NDArray[np.bool_]
+    steps: NDArray[np.int64]
+    steps_lower_bound: NDArray[np.int64]
+    final_distance: NDArray[np.float64]
+    actions: NDArray[np.float64]
+    paths: NDArray[np.float64]
+    reasons: NDArray[np.str_]
+
+    def __post_init__(self) -> None:
+        for array in vars(self).values():
+            array.flags.writeable = False
+
+    def __len__(self) -> int:
+        return len(self.steps)
+
+    def __repr__(self) -> str:
+        return f"OracleSolutions({len(self)} trials, {int(self.reachable.sum())} reached)"
+
+    @classmethod
+    def concatenated(cls, parts: "list[OracleSolutions]") -> "OracleSolutions":
+        """Join the solutions of several sets of trials."""
+        lots = [vars(part) for part in parts]
+        return cls(**{name: np.concatenate([lot[name] for lot in lots]) for name in lots[0]})
 
 
 class Oracle:
@@ -80,16 +128,10 @@ class Oracle:
     def __repr__(self) -> str:
         return f"Oracle({self.simulator.problem!r})"
 
-    def solve(self, start: ArrayLike, goal: ArrayLike) -> OracleSolution:
-        """Solve one trial; see `solve_batch`."""
-        q = finite_array("start", start, (self.simulator.arm.n_joints,))
-        width = self.simulator.world.goal_width
-        return self.solve_batch(q[None], finite_array("goal", goal, (width,))[None])[0]
-
     def solve_batch(
         self, starts: ArrayLike, goals: ArrayLike, *, on_progress: Progress | None = None
     ) -> OracleSolutions:
-        """Solve many trials.
+        """Solve trials, one or many.
 
         Parameters
         ----------
@@ -143,35 +185,28 @@ class Oracle:
         search = MotionSearch(self._single, starts, stages[0])
         arrivals, complete = self._search(search)
         self._count_contact(search, arrivals, complete)
-        distance_bounds = self._approach(search, arrivals)
+        search.try_approach(np.flatnonzero(~search.reached))
         for before, stage in pairwise(stages):
             fewest = arrivals + self._rest + self._prover.steps_apart(before, stage)
             trials = (starts, stage.targets, starts.copy(), np.arange(len(starts)))
             arrivals, complete = self._prover.bound_steps(*trials, fewest, search.left)
-            complete, distance_bounds = complete & (arrivals > self._last), 0.0 * distance_bounds
+            complete &= arrivals > self._last
         steps_bounds = np.where(arrivals > self._last, horizon + 1, arrivals + self._rest)
         actions = self._follow(search, stages)
         replay = self.simulator.rollout_actions(actions, starts, goals, record=True)
         # A motion that was to come close may reach the goal all the same.
-        distance_bounds[replay.success] = 0.0
         complete |= replay.success & (replay.steps == steps_bounds)
         no_motion = f"no contact-free motion of {horizon} steps or less found"
         no_end = "no contact-free configuration at the goal found"
         reasons = [no_motion if steps <= self._last else no_end for steps in search.solved]
         for row in np.flatnonzero(steps_bounds > horizon):
-            away = (
-                f"proven to stay {distance_bounds[row]:.3f} m away or more within {horizon} steps"
-            )
-            if not self.simulator.task.goal.plain:
-                away = f"proven for all motions of {horizon} steps"
-            reasons[row] = f"out of reach: {away}"
+            reasons[row] = f"out of reach: proven for all motions of {horizon} steps"
         return OracleSolutions(
             reachable=replay.success,
             proof_complete=complete,
             steps=replay.steps,
             steps_lower_bound=steps_bounds,
             final_distance=replay.distance,
-            distance_lower_bound=distance_bounds,
             actions=actions,
             paths=replay.paths,
             reasons=np.array(np.where(replay.success, "", reasons), dtype=np.str_),
@@ -230,18 +265,3 @@ class Oracle:
         complete[~search.reached & (steps_bounds <= self._last)] = False
         shut = blocked[beyond > self._last]
         steps_bounds[shut], complete[shut] = self._last + 1, True
-
-    def _approach(self, search: MotionSearch, steps_bounds: NDArray[np.int64]) -> Array:
-        """Prove, and seek, how close motions come to goals that none reaches."""
-        task, missed = self.simulator.task, np.flatnonzero(~search.reached)
-        starts, goals = search.starts[missed], search.stage.goals[missed]
-        box = step_box(self.simulator, starts, np.full(missed.size, task.horizon))
-        distances = np.zeros(len(steps_bounds))
-        if search.stage.walks is None:
-            proven, search.witnesses[missed] = self._prover.bound_distance(starts, goals, box)
-            distances[missed] = proven[:, 0]
-        if task.goal.plain:
-            out_of_reach = steps_bounds > task.horizon
-            distances[out_of_reach] = np.fmax(distances[out_of_reach], task.tolerance)
-        search.try_approach(missed, np.fmax(distances[missed], task.tolerance))
-        return distances

@@ -23,8 +23,8 @@ def test_step_ratio_is_that_of_the_trials_that_succeeded(bounded):
     rollouts, starts, goals = bounded.rollouts, bounded.trials.starts, bounded.trials.goals
     solutions = Oracle("right").solve_batch(starts, goals)
     expected = [
-        rollouts.steps[trial] / solution.steps_lower_bound
-        for trial, solution in enumerate(solutions)
+        rollouts.steps[trial] / solutions.steps_lower_bound[trial]
+        for trial in range(len(solutions))
         if rollouts.success[trial]
     ]
     assert 0 < len(expected) < 60
@@ -76,7 +76,6 @@ def test_nobody_is_better_than_proven_possible(arm, name, task):
     evaluation = evaluate(name, task, trials=25, seed=2, arm=arm, oracle=True)
     assert (outcomes_of((evaluation,)).step_ratio >= 1).all()
     rollouts, bounds = evaluation.rollouts, evaluation.bounds
-    assert (rollouts.distance >= bounds.distance_lower_bound).all()
     assert not rollouts.success[bounds.steps_lower_bound > 64].any()
 
 

@@ -5,8 +5,8 @@ import pytest
 from simulators import changed
 
 from kinarm.kernels.records import recorded
-from kinarm.policies.oracle.aims import Aims
 from kinarm.policies.oracle.bounding import Prover
+from kinarm.policies.oracle.goals import Aims
 from kinarm.policies.oracle.kernels.projection import damped_least_squares, layout
 from tests.helpers.reference import ReferenceSimulator
 
@@ -19,15 +19,6 @@ def prove_steps(simulator, starts, goals, *, fewest=1, most=None, **settings):
     trials = (starts, goals, witnesses, np.arange(n))
     found = Prover(simulator).bound_steps(*trials, *limits, **settings)
     return *found, witnesses
-
-
-def prove_distance(simulator, starts, goals, box=None, **settings):
-    """Distances proven and found, and where they were found."""
-    arm, moved = simulator.arm, slice(simulator.n_actions)
-    whole = tuple(np.tile(limit[moved], (len(starts), 1)) for limit in (arm.lower, arm.upper))
-    prover = Prover(simulator)
-    distances, configurations = prover.bound_distance(starts, goals, box or whole, **settings)
-    return *distances.T, configurations
 
 
 def aims_at(simulator, goals):
@@ -67,18 +58,18 @@ def assert_identical(first, second, rows=slice(None)):
             assert array[rows].tobytes() == other.tobytes(), name
 
 
-def replayed(simulator, start, goal, solution):
-    """The motion of a solution, as the slow reference runs it: at four configurations a step."""
-    simulator = changed(simulator, tested_configurations=4)
-    actions = iter([*solution.actions, *np.zeros((simulator.task.horizon, simulator.n_actions))])
-    return ReferenceSimulator(simulator).rollout(lambda _: next(actions), start, goal)
+def replayed(simulator, start, goal, actions):
+    """A motion of the oracle, as the slow reference runs it: at four configurations a step."""
+    simulator, left = changed(simulator, tested_configurations=4), iter(actions)
+    return ReferenceSimulator(simulator).rollout(lambda _: next(left), start, goal)
 
 
 def assert_reference_agrees(oracle, starts, goals, known):
-    for start, goal, solution in zip(starts, goals, known, strict=True):
-        episode = replayed(oracle.simulator, start, goal, solution)
+    for row, (start, goal) in enumerate(zip(starts, goals, strict=True)):
+        episode = replayed(oracle.simulator, start, goal, known.actions[row])
+        steps = known.steps[row]
         assert episode.contact is None
-        assert episode.success == solution.reachable
-        assert len(episode.rewards) == solution.steps
-        assert episode.distance == pytest.approx(solution.final_distance, abs=1e-9)
-        np.testing.assert_allclose(solution.path, episode.path, rtol=0, atol=1e-9)
+        assert episode.success == known.reachable[row]
+        assert len(episode.rewards) == steps
+        assert episode.distance == pytest.approx(known.final_distance[row], abs=1e-9)
+        np.testing.assert_allclose(known.paths[row, : steps + 1], episode.path, rtol=0, atol=1e-9)

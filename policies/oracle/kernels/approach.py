@@ -1,4 +1,4 @@
-"""How close the tool can come to a goal, and how soon, by branch and bound.
+"""How soon the tool can come close to a goal, by branch and bound.
 
 A box of configurations is excluded, or cut, where a lower bound of the distance exceeds what is
 asked for. On demand it is excluded, too, if some pair of bodies is proven to overlap throughout
@@ -67,9 +67,9 @@ def layout(n: int, n_joints: int, n_placed: int, n_axes: int) -> Layout:
     """
     rows = 3 * n_axes if n_axes > 0 else Fixed(0)
     shapes = {
-        # A row of the stack: lower and upper corner [rad or m], and proven distance [m].
+        # A row of the stack: lower and upper corner [rad or m].
         # Half-widths, and the share that is left.
-        "box": (ONE, 2 * n + 1),
+        "box": (ONE, 2 * n),
         "half": (n,),
         "share": (ONE,),
         # Centre, and a configuration tried [rad or m]; their poses.
@@ -153,7 +153,6 @@ def search(
     fewest: int,
     most: int,
     enough: float,
-    resolution: float,
     contact: bool,
     budget: int,
     lower: Array,
@@ -161,13 +160,11 @@ def search(
     best: Array,
     stack: Array,
     block: Boxes,
-) -> tuple[bool, int, float, float]:
-    """Search a box for the configuration with the fewest steps to a goal, or the closest.
+) -> tuple[bool, int]:
+    """Search for the configuration close enough to a goal in the fewest steps.
 
-    With an infinite resolution, the search is for one close enough to the goal
-    in the fewest steps from the start. Else it is for the closest one, whose
-    distance may exceed what is proven by the resolution. The distance of a goal
-    with rotations is that of the tool or of its axes, whichever is larger.
+    The distance of a goal with rotations is that of the tool or of its axes,
+    whichever is larger.
 
     Parameters
     ----------
@@ -177,21 +174,20 @@ def search(
         The arm's start, shape (n_joints,), the goal [m] and its rotations, and
         moves in a step, shape (n,).
     allowed : ndarray, shape (2, n)
-        Limits of the first n joints in a search for the fewest steps [rad or m].
+        Limits of the first n joints [rad or m].
     fewest, most : int
         Range of the steps.
-    enough, resolution : float
-        Distance from the goal that is close enough, and difference that matters
-        [m].
+    enough : float
+        Distance from the goal that is close enough [m].
     contact, budget : bool and int
         Whether to rule out what is proven to touch; boxes examined at most.
     lower, upper : ndarray, shape (n,)
-        The box of the first n joints [rad or m]; in a search for the fewest
-        steps, filled in, and smaller with every configuration found.
+        Filled with the box of the first n joints [rad or m], which becomes
+        smaller with every configuration found.
     best : ndarray, shape (n_joints,)
         Filled with the configuration found; joints beyond the n-th stay as at
         the start.
-    stack, block : ndarray, shape (WAITING, 2 n + 1), and Boxes
+    stack, block : ndarray, shape (WAITING, 2 n), and Boxes
         Work space.
 
     Returns
@@ -199,8 +195,6 @@ def search(
     complete, steps : bool and int
         Whether it is proven that there is nothing better, and the steps of the
         configuration found; more than ``most`` if there is none.
-    distance, proven : float
-        Of the closest configuration found, and a lower bound over the box [m].
     """
     n, n_joints = lower.shape[0], start.shape[0]
     box, half, lever = block.box, block.half, block.lever
@@ -209,7 +203,6 @@ def search(
     slope, least, bend = model[3], model[4], model[5]
     spin, turned, apart = block.spin, block.turned, block.turned[0]
     places = (as_numbers(block.q), as_numbers(block.tried))
-    found, lower_bounds = as_numbers(block.distance), as_numbers(box)
     shares = as_numbers(block.share)
     place_bodies(shapes.placed, block.poses)
     place_bodies(shapes.placed, block.between)
@@ -217,26 +210,20 @@ def search(
         block.q[0, i] = start[i]
         block.tried[0, i] = start[i]
         best[i] = start[i]
-    fewer = resolution == np.inf
-    if fewer:
-        within_steps(chain, allowed, start, step_limit, most, lower, upper)
+    within_steps(chain, allowed, start, step_limit, most, lower, upper)
     for i in range(n):
         lever[i] = turn.turning[i] + (1.0 if chain.prismatic[i] else bounds.curvature[i, i])
         # Joints that hardly move the tool still decide what it touches.
         lever[i] = math.sqrt(lever[i]) if contact else lever[i]
-        stack[0, i], stack[0, n + i], stack[0, 2 * n] = lower[i], upper[i], 0.0
-    steps, closest, proven = most + 1, np.inf, np.inf
+        stack[0, i], stack[0, n + i] = lower[i], upper[i]
     # With axes, boxes are separated from balls that are smaller, since models are not exact.
     aimed = AIMED * enough
-    # Boxes are excluded beyond the cutoff, which falls with every closer configuration found: what
-    # is not closer by the resolution does not matter.
-    cutoff = enough + max(1.0, turn.weight) * ROUNDING if fewer else np.inf
-    waiting, examined, undecided = 1, 0, False
+    # What is proven to be farther from the goal than this is excluded, whatever is rounded.
+    cutoff = enough + max(1.0, turn.weight) * ROUNDING
+    steps, waiting, examined, undecided = most + 1, 1, 0, False
     # Depth first: the stack stays short, and leads straight to where the model expects the goal.
-    # What is found there lowers the cutoff, or the steps, for all boxes.
-    while waiting > 0 and examined < budget and waiting + LANES < WAITING:
-        if steps <= fewest if fewer else closest <= enough:
-            break
+    # What is found there lowers the steps for all boxes.
+    while waiting > 0 and examined < budget and waiting + LANES < WAITING and steps > fewest:
         count = min(waiting, LANES, budget - examined)
         for lane in range(LANES):  # of which the last ones may hold the same box
             put(stack, waiting - 1 - min(lane, count - 1), box, 0, lane)
@@ -271,10 +258,9 @@ def search(
         if spin.shape[0] > 0:
             length = turn_from_goal(turn, n_joints, block.between, apart)
             block.distance[1] = max(block.distance[1], length)
-        # Those count that come closer than what was found, and are free.
-        far = enough if fewer else closest
-        at_centre = ~empty & (block.distance[0] <= far)
-        at_step = ~empty & (block.distance[1] <= far)
+        # Those count that come close enough, and are free.
+        at_centre = ~empty & (block.distance[0] <= enough)
+        at_step = ~empty & (block.distance[1] <= enough)
         if contact and any_lane(at_centre | at_step):
             work = (half, 0.0, turns)
             at_centre = at_centre & ~overlaps(at_centre, chain, shapes, block.poses, *work)
@@ -282,24 +268,17 @@ def search(
         bits = (lane_bits(at_centre), lane_bits(at_step))
         for index in range(2 * count if bits[0] | bits[1] != 0 else 0):
             lane, attempt = index >> 1, index & 1
-            distance = found[attempt, lane]
             tried = places[attempt]
             if bits[attempt] >> lane & 1 == 0:
                 continue
-            if fewer:
-                needed = float(fewest)
-                for i in range(n):
-                    moved = abs(tried[0, i, lane] - start[i]) - 2.0 * drift(chain, i, most)
-                    needed = max(needed, moved / step_limit[i])
-                if np.ceil(needed) >= steps:
-                    continue
-                steps = int(np.ceil(needed))
-                within_steps(chain, allowed, start, step_limit, steps - 1, lower, upper)
-            elif distance >= closest:
+            needed = float(fewest)
+            for i in range(n):
+                moved = abs(tried[0, i, lane] - start[i]) - 2.0 * drift(chain, i, most)
+                needed = max(needed, moved / step_limit[i])
+            if np.ceil(needed) >= steps:
                 continue
-            else:
-                cutoff = max(enough, distance - resolution) + ROUNDING
-            closest = distance
+            steps = int(np.ceil(needed))
+            within_steps(chain, allowed, start, step_limit, steps - 1, lower, upper)
             for i in range(n):
                 best[i] = tried[0, i, lane]
         sides = (box[0, :n], box[0, n : 2 * n])
@@ -308,25 +287,16 @@ def search(
         bound = max(bound, joint_bound(bounds, block.poses, goal, half))
         if spin.shape[0] > 0:
             bound = max(bound, at_angle)
-        # What is proven of the whole holds for its parts.
-        box[0, 2 * n] = max(box[0, 2 * n], bound)
-        beyond = box[0, 2 * n] > cutoff
+        beyond = bound > cutoff
         if contact and any_lane(~beyond & ~empty):
-            # Contact comes last, since it asks about every pair. Of a box that touches something
-            # throughout, nothing is to be proven.
+            # Contact comes last, since it asks about every pair.
             work = (half, 1.0, turns)
             empty = empty | overlaps(~beyond & ~empty, chain, shapes, block.poses, *work)
         # Put what is left of undecided boxes back, or their halves.
-        excluded, gone = lane_bits(beyond), lane_bits(empty)
+        settled = lane_bits(beyond | empty)
         for lane in range(count - 1, -1, -1):
-            if gone >> lane & 1:
+            if settled >> lane & 1:
                 continue
-            if excluded >> lane & 1:
-                # Nothing in the box comes closer than this.
-                proven = min(proven, lower_bounds[0, 2 * n, lane])
-                continue
-            if shares[0, lane] < 1.0:
-                proven = min(proven, cutoff)
             if shares[0, lane] < 0.5:
                 take(box, 0, lane, stack, waiting)
                 waiting += 1
@@ -335,9 +305,4 @@ def search(
             else:
                 # Such boxes lie where bounds meet what is asked for, or proofs of contact end.
                 undecided = True
-                proven = min(proven, lower_bounds[0, 2 * n, lane])
-    complete = (waiting == 0 and not undecided) or (steps <= fewest if fewer else closest <= enough)
-    # Boxes that still wait have the bounds of those that were halved.
-    for i in range(waiting):
-        proven = min(proven, stack[i, 2 * n])
-    return complete, steps, closest, max(min(proven, closest) - ROUNDING, 0.0)
+    return (waiting == 0 and not undecided) or steps <= fewest, steps

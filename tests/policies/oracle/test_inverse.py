@@ -9,10 +9,10 @@ from proofs import aims_at, projected
 from kinarm.arm import Arm
 from kinarm.kernels.records import recorded
 from kinarm.policies.oracle import motion_search
+from kinarm.policies.oracle.goals import Stage
 from kinarm.policies.oracle.inverse import solve_within, step_box, steps_between
 from kinarm.policies.oracle.kernels.projection import damped_least_squares, layout
 from kinarm.policies.oracle.motion_search import MotionSearch
-from kinarm.policies.oracle.stages import Stage
 from kinarm.problem import PROBLEMS
 from kinarm.simulator import Simulator
 

@@ -5,7 +5,7 @@ import pytest
 from proofs import assert_identical, assert_reference_agrees, drawn, replayed
 
 from kinarm.errors import InvalidInputError, StartInContactError
-from kinarm.policies import Oracle, OracleSolution, OracleSolutions
+from kinarm.policies import Oracle, OracleSolutions
 from kinarm.policies.oracle.inverse import steps_between
 from kinarm.problem import PROBLEMS
 
@@ -37,17 +37,14 @@ class TestBounds:
         assert (known.steps <= HORIZON).all()
         assert (known.steps[~reached] == HORIZON).all()
         assert (known.steps_lower_bound <= HORIZON + 1).all()
-        assert (known.final_distance >= known.distance_lower_bound).all()
         assert (known.final_distance <= TOLERANCE)[reached].all()
-        np.testing.assert_array_equal(known.distance_lower_bound[reached], 0)
 
     def test_straight_motion_to_the_end_takes_no_less_than_the_floor(self, solved):
         oracle, starts, _, known = solved
-        for start, solution in zip(starts, known, strict=True):
-            if solution.reachable:
-                straight = steps_between(oracle.simulator, start, solution.path[-1])
-                assert np.ceil(straight - 1e-9) >= solution.steps_lower_bound
-                assert straight <= solution.steps + 1e-9
+        ends = known.paths[np.arange(len(known)), known.steps]
+        straight = steps_between(oracle.simulator, starts, ends)[known.reachable]
+        assert (np.ceil(straight - 1e-9) >= known.steps_lower_bound[known.reachable]).all()
+        assert (straight <= known.steps[known.reachable] + 1e-9).all()
 
     def test_gap_is_small_and_floors_are_tight(self, solved):
         _, _, _, known = solved
@@ -60,20 +57,17 @@ class TestBounds:
 
     def test_trials_that_are_not_reached_say_why(self, solved):
         _, _, _, known = solved
-        for solution in known:
-            if solution.reachable:
-                assert solution.reason is None
+        for row, reason in enumerate(known.reasons):
+            if known.reachable[row]:
+                assert reason == ""
                 continue
-            assert solution.distance_lower_bound > 0
-            assert solution.final_distance >= solution.distance_lower_bound
-            assert solution.final_distance > TOLERANCE
-            if solution.steps_lower_bound > HORIZON:
-                assert solution.proof_complete
-                assert solution.distance_lower_bound >= TOLERANCE
-                assert f"{solution.distance_lower_bound:.3f} m away" in solution.reason
-                assert solution.final_distance < solution.distance_lower_bound + 0.03
+            assert known.final_distance[row] > TOLERANCE
+            if known.steps_lower_bound[row] > HORIZON:
+                assert known.proof_complete[row]
+                assert reason == "out of reach: proven for all motions of 64 steps"
+                assert known.final_distance[row] < 3 * TOLERANCE
             else:
-                assert "found" in solution.reason
+                assert "found" in reason
 
     def test_goals_of_either_bench_are_reached_as_far_as_the_arm_is_long(self, solved):
         oracle, _, goals, known = solved
@@ -86,7 +80,7 @@ class TestBounds:
     def test_a_thousand_trials_of_the_default_arm(self):
         oracle = Oracle("both")
         known = oracle.solve_batch(*drawn(oracle.simulator, 4, 1000))
-        rest = {row: known[row].reason for row in np.flatnonzero(~known.reachable)}
+        rest = known.reasons[~known.reachable]
         assert len(rest) <= 1, rest
         gap = (known.steps - known.steps_lower_bound)[known.reachable]
         assert (gap >= 0).all()
@@ -130,11 +124,9 @@ class TestDeterminism:
         assert_identical(known, oracle.solve_batch(starts[:8], goals[:8]), slice(8))
 
     def test_single_trials_equal_a_batch(self, oracle, few):
-        for start, goal, expected in zip(*drawn(oracle.simulator, 17, 4), few, strict=True):
-            one = oracle.solve(start.tolist(), goal.tolist())
-            np.testing.assert_array_equal(one.path, expected.path)
-            np.testing.assert_array_equal(one.actions, expected.actions)
-            assert one.steps_lower_bound == expected.steps_lower_bound
+        for row, trial in enumerate(zip(*drawn(oracle.simulator, 17, 4), strict=True)):
+            one = oracle.solve_batch(*(each.tolist() for each in trial))
+            assert_identical(few, one, slice(row, row + 1))
 
     def test_mirror_images_have_the_same_floor(self, solved):
         oracle, starts, goals, known = solved
@@ -151,56 +143,56 @@ def with_task(**settings):
     return Oracle(PROBLEMS["both"].replace(**settings), threads=1)
 
 
+def numbers(known):
+    """Of one trial: steps of the motion, steps proven necessary, whether the proof is complete."""
+    return known.steps[0], known.steps_lower_bound[0], known.proof_complete[0]
+
+
 class TestSingleTrials:
     def test_goal_far_away(self, oracle):
         # The second axis lies at (0.075, 0, 0.33) when the base points at the goal; beyond it
         # the arm stretches to 0.3 m + 0.329 m + 0.23 m.
         goal = np.array([2.0, 0.0, 0.5])
-        solution = oracle.solve(np.zeros(6), goal)
+        known = oracle.solve_batch(np.zeros(6), goal)
         reach = 0.3 + np.hypot(0.32, 0.075) + 0.23
         exact = np.hypot(2.0 - 0.075, 0.5 - 0.33) - reach
-        assert solution.reason.startswith("out of reach")
-        known = (solution.steps, solution.steps_lower_bound, solution.proof_complete)
-        assert known == (HORIZON, HORIZON + 1, True)
-        assert exact - 0.1 < solution.distance_lower_bound < exact + 2e-3
-        assert solution.distance_lower_bound <= solution.final_distance < exact + 0.1
+        assert known.reasons[0].startswith("out of reach")
+        assert numbers(known) == (HORIZON, HORIZON + 1, True)
+        assert exact - 0.1 < known.final_distance < exact + 0.1
         before = np.linalg.norm(oracle.simulator.arm.tool_position(np.zeros(6)) - goal)
-        assert solution.final_distance < before - 0.1
-        assert replayed(oracle.simulator, np.zeros(6), goal, solution).contact is None
+        assert known.final_distance < before - 0.1
+        assert replayed(oracle.simulator, np.zeros(6), goal, known.actions[0]).contact is None
 
     def test_goal_within_the_bench(self, oracle):
         # Within reach, were it not for the wood: 0.15 m below the top.
-        solution = oracle.solve(np.zeros(6), [0.0, 0.65, 0.15])
-        assert not solution.reachable
-        assert solution.steps_lower_bound <= HORIZON
-        assert solution.reason == "no contact-free configuration at the goal found"
-        assert 0.09 < solution.final_distance < 0.3
+        known = oracle.solve_batch(np.zeros(6), [0.0, 0.65, 0.15])
+        assert not known.reachable
+        assert known.steps_lower_bound <= HORIZON
+        assert known.reasons == "no contact-free configuration at the goal found"
+        assert 0.09 < known.final_distance < 0.3
 
     def test_start_at_the_goal_takes_one_step(self, oracle):
         start, _ = drawn(oracle.simulator, 10, 1)
         for offset in (0.0, 0.9 * TOLERANCE):
             goal = oracle.simulator.arm.tool_position(start[0]) + np.array([0, 0, offset])
-            solution = oracle.solve(start[0], goal)
-            assert solution.reachable
-            known = (solution.steps, solution.steps_lower_bound, solution.proof_complete)
-            assert known == (1, 1, True)
-            assert solution.path.shape == (2, 6)
+            known = oracle.solve_batch(start[0], goal)
+            assert known.reachable
+            assert numbers(known) == (1, 1, True)
+            assert np.isfinite(known.paths[0]).all(axis=1).sum() == 2
+            np.testing.assert_array_equal(known.actions[0, 1:], 0)
 
     def test_horizon_below_the_floor(self, oracle):
         starts, goals = drawn(oracle.simulator, 11, 8)
         known = oracle.solve_batch(starts, goals)
         row = int(known.steps_lower_bound.argmax())
         horizon = int(known.steps_lower_bound[row]) - 1
-        solution = with_task(horizon=horizon).solve(starts[row], goals[row])
-        assert not solution.reachable
-        assert solution.steps == horizon
-        assert solution.steps_lower_bound == horizon + 1
-        assert solution.proof_complete
-        assert solution.reason.endswith(f"within {horizon} steps")
-        assert TOLERANCE <= solution.distance_lower_bound <= solution.final_distance
-        assert solution.final_distance < 2 * TOLERANCE
+        short = with_task(horizon=horizon).solve_batch(starts[row], goals[row])
+        assert not short.reachable
+        assert numbers(short) == (horizon, horizon + 1, True)
+        assert short.reasons[0].endswith(f"of {horizon} steps")
+        assert TOLERANCE < short.final_distance < 2 * TOLERANCE
         enough = with_task(horizon=int(known.steps[row]))
-        assert enough.solve(starts[row], goals[row]).steps == known.steps[row]
+        assert enough.solve_batch(starts[row], goals[row]).steps == known.steps[row]
 
     def test_wider_tolerance_lowers_the_floor(self, oracle):
         starts, goals = drawn(oracle.simulator, 12, 12)
@@ -226,23 +218,18 @@ class TestRefusals:
             ([HOME], [GOAL, GOAL], "goals must have shape"),
             ([HOME, [0.0, 0.0, 9.0, 0.0, 0.0, 0.0]], [GOAL, GOAL], r"starts\[1\] lies outside"),
             ([HOME], [[0.0, 0.0, -np.inf]], "goals must be finite"),
+            (HOME, [0.0, np.nan, 0.3], "goals must be finite"),
         ],
     )
-    def test_bad_batches(self, oracle, starts, goals, message):
+    def test_bad_trials(self, oracle, starts, goals, message):
         with pytest.raises(InvalidInputError, match=message):
             oracle.solve_batch(starts, goals)
-
-    def test_bad_trials(self, oracle):
-        with pytest.raises(InvalidInputError, match="start must have shape"):
-            oracle.solve([HOME], GOAL)
-        with pytest.raises(InvalidInputError, match="goal must be finite"):
-            oracle.solve(HOME, [0.0, np.nan, 0.3])
 
     def test_start_in_contact_names_the_pair(self, oracle):
         pair = oracle.simulator.world.contact_model.contact_pair(FOLDED)
         touching = f"is in contact: {pair[0]} touches {pair[1]}$"
         with pytest.raises(StartInContactError, match=f"start 0 {touching}"):
-            oracle.solve(FOLDED, GOAL)
+            oracle.solve_batch(FOLDED, GOAL)
         with pytest.raises(StartInContactError, match=f"start 2 {touching}"):
             oracle.solve_batch([HOME, HOME, FOLDED], [GOAL] * 3)
 
@@ -252,7 +239,7 @@ def test_progress_counts_up_to_all(oracle, monkeypatch):
     for n, expected in ((5, [(2, 5), (4, 5), (5, 5)]), (0, [(0, 0)])):
         calls, trials = [], (np.tile(HOME, (n, 1)), np.tile(GOAL, (n, 1)))
         known = oracle.solve_batch(*trials, on_progress=lambda *done, to=calls: to.append(done))
-        assert (calls, len(list(known))) == (expected, n)
+        assert (calls, len(known)) == (expected, n)
         assert known.actions.shape == (n, HORIZON, 5)
 
 
@@ -261,17 +248,7 @@ def few(oracle):
     return oracle.solve_batch(*drawn(oracle.simulator, 17, 4))
 
 
-def test_solutions_are_indexed(few, oracle):
-    solution = few[2]
-    assert isinstance(solution, OracleSolution)
-    kinds = (solution.steps, solution.reachable, solution.final_distance)
-    assert [type(each) for each in kinds] == [int, bool, float]
-    assert solution.actions.shape == (solution.steps, 5)
-    np.testing.assert_array_equal(solution.path, few.paths[2, : solution.steps + 1])
-    np.testing.assert_array_equal(few.actions[2, solution.steps :], 0)
-    np.testing.assert_array_equal(few[-1].path, few[3].path)
-    with pytest.raises(IndexError):
-        few[4]
+def test_solutions_are_joined(few, oracle):
     empty = oracle.solve_batch(np.zeros((0, 6)), np.zeros((0, 3)))
     joined = OracleSolutions.concatenated([few, empty, few])
     for rows in (slice(4), slice(4, 8)):

@@ -8,9 +8,9 @@ from configurations import pair_distances
 
 from kinarm.arm import Arm
 from kinarm.policies.oracle import motion_search
+from kinarm.policies.oracle.goals import Stage
 from kinarm.policies.oracle.inverse import steps_between
 from kinarm.policies.oracle.motion_search import MotionSearch, along_path, two_segments
-from kinarm.policies.oracle.stages import Stage
 from kinarm.policies.planning.motions import Motions
 from kinarm.policies.planning.paths import find_path
 from kinarm.problem import PROBLEMS

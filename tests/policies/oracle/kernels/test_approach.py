@@ -5,7 +5,7 @@ from functools import cache
 import numpy as np
 import pytest
 from configurations import depths
-from proofs import prove_distance, prove_steps
+from proofs import prove_steps
 
 from kinarm.arm import Arm
 from kinarm.problem import PROBLEMS
@@ -88,59 +88,6 @@ def planar_distance(lower, upper, goal):
     away = [np.abs(planar_tools(first, q) - (goal[0] + 1j * goal[1])) for q in candidates]
     error = (INNER + OUTER) * (first[1] - first[0]) / 2
     return np.hypot(np.min(away), goal[2] - HEIGHT), error
-
-
-class TestPlanarDistance:
-    @pytest.mark.parametrize(
-        ("nearest", "farthest", "height"), [(0.82, 1.6, 0), (0, 0.18, 0), (0, 1.2, 0.5)]
-    )
-    def test_goals_beyond_the_ring_in_its_hole_and_off_the_plane(
-        self, planar, nearest, farthest, height
-    ):
-        goals = planar_goals(np.random.default_rng(1), 60, nearest, farthest, height)
-        proven, found, at = prove_distance(planar, np.zeros((60, 2)), goals)
-        exact = ring_distance(goals)
-        assert (proven <= exact + 1e-12).all()
-        assert (found >= exact - 1e-12).all()
-        assert (found - proven < 1.1e-3).all()
-        tools = np.array([planar.arm.tool_position(q) for q in at])
-        np.testing.assert_allclose(np.linalg.norm(tools - goals, axis=1), found, atol=1e-12)
-
-    @pytest.mark.parametrize("resolution", [0.1, 0.01, 1e-4])
-    def test_resolution_is_kept(self, planar, resolution):
-        goals = planar_goals(np.random.default_rng(4), 30, 0, 1.2, height=0.3)
-        proven, found, _ = prove_distance(planar, np.zeros((30, 2)), goals, resolution=resolution)
-        exact = ring_distance(goals)
-        assert (proven <= exact + 1e-12).all()
-        assert (exact <= found + 1e-12).all()
-        assert (found - proven <= resolution + 1e-15).all()
-
-    def test_boxes(self, planar):
-        rng = np.random.default_rng(5)
-        goals = planar_goals(rng, 60, 0, 1.0, height=0.1)
-        ends = np.sort(rng.uniform(-3.3, 3.3, (2, 60, 2)), axis=0)
-        proven, found, at = prove_distance(
-            planar, np.zeros((60, 2)), goals, (ends[0].copy(), ends[1].copy())
-        )
-        assert ((at >= ends[0] - 1e-12) & (at <= ends[1] + 1e-12)).all()
-        for i in range(60):
-            least, error = planar_distance(ends[0, i], ends[1, i], goals[i])
-            assert proven[i] <= least
-            assert found[i] >= least - error
-        assert (found - proven < 1.1e-3).all()
-
-    def test_boxes_of_no_extent(self, planar):
-        rng = np.random.default_rng(9)
-        corners, goals = rng.uniform(-3.3, 3.3, (200, 2)), rng.uniform(-1, 1, (200, 3))
-        proven, found, at = prove_distance(
-            planar, np.zeros((200, 2)), goals, (corners.copy(), corners.copy())
-        )
-        tools = np.array([planar.arm.tool_position(q) for q in corners])
-        exact = np.linalg.norm(tools - goals, axis=1)
-        # The proven one leaves room for rounding.
-        assert (proven <= exact).all()
-        np.testing.assert_allclose([proven, found], [exact, exact], atol=2e-9)
-        np.testing.assert_array_equal(at, corners)
 
 
 def planar_steps(start, goal):
@@ -296,21 +243,3 @@ class TestBudget:
         np.testing.assert_array_equal(proven[certain], floors[certain])
         if budget < 30:
             assert not certain.all()
-
-    def test_distances_proven_with_small_budgets_are_not_larger(self, planar):
-        goals = planar_goals(np.random.default_rng(13), 40, 0, 1.4, height=0.3)
-        exact, before = ring_distance(goals), np.zeros(40)
-        for budget in (0, 1, 2, 5, 20, 100, 1000, 20_000):
-            proven, found, _ = prove_distance(planar, np.zeros((40, 2)), goals, budget=budget)
-            assert (proven <= exact + 1e-12).all()
-            assert (found >= exact - 1e-12).all()
-            assert (proven >= before - 1e-9).all()
-            before = proven
-        assert (exact - before < 1.1e-3).all()
-
-    def test_no_tolerance_that_numbers_resolve(self, planar):
-        # An axis stretched out approaches the rim to second order: halving goes on for ever.
-        goals = np.array([[INNER + OUTER, 0, HEIGHT + 1e-13]])
-        proven, found, _ = prove_distance(planar, np.ones((1, 2)), goals, resolution=0.0)
-        assert proven[0] <= 1e-13
-        assert found[0] >= 0

@@ -1,13 +1,16 @@
-"""What goals ask of the arm: a place of the tool, directions of its axes, and limits of joints."""
+"""Goals as the oracle takes them: what they ask of the arm, and where each is after every step."""
 
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from kinarm.bodies import rotation_of_quaternion
-from kinarm.kernels.compiling import Array, Vector
-from kinarm.kernels.goals import CONFIGURATION, DIRECTION, POSE, circle_points
+from kinarm.kernels.arriving import put_goal
+from kinarm.kernels.compiling import Array, Vector, kernel
+from kinarm.kernels.goals import CONFIGURATION, DIRECTION, POSE, GoalRules, circle_points
 from kinarm.kernels.goals import TURN as WHOLE_TURN
+from kinarm.kernels.lanes import LANES, as_lanes, as_numbers
 from kinarm.kernels.records import recorded
 from kinarm.policies.oracle.kernels.rotation import Turn
 from kinarm.simulator import Simulator
@@ -83,3 +86,74 @@ class Aims(NamedTuple):
         x, y, z = self.position[row].tolist()
         turn: Turn = recorded(self.turn._replace(wanted=self.wanted[row].copy()))
         return (x, y, z), turn, np.array([self.lower[row], self.upper[row]])
+
+
+class Stage(NamedTuple):
+    """A goal of each of n episodes.
+
+    Attributes
+    ----------
+    goals : ndarray, shape (n, goal_width)
+        The goals, before they move.
+    walks : ndarray, shape (n, horizon + 1, goal_width), optional
+        Where they are after each step of the episode, if they move.
+    """
+
+    goals: Array
+    walks: Array | None = None
+
+    @property
+    def targets(self) -> Array:
+        """What bounds are about: goals, or their walks."""
+        return self.goals if self.walks is None else self.walks
+
+    def of(self, rows: NDArray[np.int64], taken: NDArray[np.int64]) -> "Stage":
+        """Goals of some episodes, from the steps on that they have taken."""
+        if self.walks is None:
+            return Stage(self.goals[rows])
+        last = self.walks.shape[1] - 1
+        steps = np.fmin(taken[:, None] + np.arange(last + 1), last)
+        return Stage(self.goals[rows], self.walks[rows[:, None], steps])
+
+
+def stages_of(simulator: Simulator, starts: Array, goals: Array) -> list[Stage]:
+    """Goals of episodes in turn.
+
+    Parameters
+    ----------
+    simulator, starts, goals
+        The simulator, starts, shape (n, n_joints) [rad or m], and first goals,
+        shape (n, goal_width).
+    """
+    goal, rules = simulator.task.goal, simulator.world.rules.goal
+    if not goal.changes:
+        return [Stage(goals)]
+    drawn, stages = simulator.reset(starts, goals).pursuit.goals, []
+    for number in range(goal.sequence):
+        walks = None
+        if goal.motion is not None:
+            walks = np.empty((len(goals), simulator.task.horizon + 1, goals.shape[1]))
+            follow_goals(rules, drawn, number, walks)
+        stages.append(Stage(drawn[:, number].copy(), walks))
+    return stages
+
+
+@kernel
+def follow_goals(goal: GoalRules, goals: Array, number: int, walks: Array) -> None:
+    """Fill in where goals are, shape (n, horizon + 1, goal_width).
+
+    Parameters
+    ----------
+    goal, goals, number
+        How goals change, those of all episodes, shape (n, n_goals, goal_width), and
+        which of them is followed.
+    walks : ndarray
+        What is filled in.
+    """
+    n, n_steps, width = walks.shape
+    present = as_lanes(np.zeros((1, width, LANES)))
+    for e in range(n):
+        for step in range(n_steps):
+            put_goal(e, step, number, 0, goal, goals, present)
+            for i in range(width):
+                walks[e, step, i] = as_numbers(present)[0, i, 0]
