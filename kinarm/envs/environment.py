@@ -192,15 +192,20 @@ class ArmEnvironment(Lifecycle):
         return self._episodes
 
     def _find_contacts(self, episodes: Episodes, result: StepResult) -> None:
-        """Fill in the numbers of the first contacts of a step that are not known yet."""
+        """Fill in the numbers of contacts of a step that are not known yet."""
         contact, refused, world = result.contact, result.collision, self.simulator.world
         if np.count_nonzero(refused) == np.count_nonzero(contact):
             return
         rows = np.flatnonzero(refused & (contact == 0))
         ways = episodes.q[rows], episodes.target[rows], episodes.scenes_at(rows)
         for row, step in zip(rows, world.steps_of(*ways, episodes.steps[rows] - 1), strict=True):
-            found = world.contact_of_step(step)
-            contact[row] = self.contact_names.index(found.pair if found else None)
+            model, end = step.at(1.0)
+            index = model.first_in_contact(end)
+            if index is None:  # what touches on the way alone is looked for
+                found = world.contact_of_step(step)
+                contact[row] = self.contact_names.index(found.pair if found else None)
+            else:
+                contact[row] = 1 + index
 
     def _make_interface(self, simulator: Simulator, dtype: DTypeLike) -> Interface:
         return Interface(simulator, dtype)

@@ -177,8 +177,6 @@ def advance(counters: NDArray[np.int64], session: Session) -> int:
                     episodes.planes[e, pair, GAP] = as_numbers(block.height)[pair, lane]
                 n_alive -= 1
                 pair = episodes.touched[e]
-                if rules.tested == 0:
-                    episodes.touched[e] = 0
                 if pair > 0:
                     refuse_step(e, rules, episodes)
                 else:
