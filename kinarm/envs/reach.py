@@ -76,8 +76,8 @@ class ReachEnv(ArmEnvironment, gymnasium.Env[Any, Array]):
 
     **Info**: ``distance`` [m]; ``configuration``, the joint positions [rad or
     m], as the attribute of that name has them; and after a step ``success``
-    and, the same, ``is_success``; ``collision``; ``contact``, the number of the
-    two bodies that would have touched, whose names are
+    and, the same, ``is_success``; ``collision``; ``contact``, the number of
+    two bodies that would touch at the move's end, or if none do, on its way, whose names are
     ``contact_names[contact]``, or 0; and the five reward terms.
 
     **Versions**: v0, the first.

@@ -75,14 +75,18 @@ def play_page(
 def _check_playable(world: World) -> None:
     """Refuse a world with more than a page plays."""
     problem, goal = world.problem, world.problem.task.goal
-    plant = replace(problem.plant, delay=0, bandwidth=0.0, damping=1.0, feedback="measured")
-    ranges = any(isinstance(value, tuple) for value in vars(problem.plant).values())
+    plant = problem.plant
+    played = {name: getattr(plant, name) for name in ("delay", "bandwidth", "damping", "feedback")}
+    lags = plant != Plant(**played) or any(isinstance(each, tuple) for each in played.values())
     for wrong, reason in (
         (problem.scene.random_bodies, "random bodies"),
         (problem.scene.moving, "bodies that move"),
         (goal.changes, "goals that move or follow each other"),
         (goal.kind == "configuration", "goals that are configurations"),
-        (plant != Plant() or ranges, "a plant with more than one delay and one kind of servo"),
+        (
+            plant != Plant(**played) or ranges,
+            "a plant with more than one delay and one kind of servo",
+        ),
         (world.rules.tested, "steps that are tested at some configurations alone"),
     ):
         if wrong:

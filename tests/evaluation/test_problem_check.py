@@ -15,7 +15,7 @@ def test_the_papers_third_task():
     low, high = check.free_starts.ci95
     assert low < 0.72 < high
     assert len(check.touching) == 28
-    assert not any(check.mirror.values())
+    assert not check.mirror
 
 
 def test_where_starts_are_listed_these_are_checked():

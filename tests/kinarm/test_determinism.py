@@ -22,12 +22,12 @@ LAGGING = Plant(
     calibration=(0.0, 0.02),
     goal_noise=0.003,
 )
-POSE = {"kind": "pose", "rotation_tolerance": 1.0, "wander": 20}
-DIRECTION = {"kind": "direction", "axis": (0.0, 0.0, -1.0), "angle": 0.9}
+POSE = {"kind": "pose", "rotation_tolerance": 1.0}
+DIRECTION = {"kind": "direction", "rotation_tolerance": 1.0}
 PROBLEMS = {
     "sequence": BOTH.replace(goal={"sequence": 3}),
     "held sequence of directions": BOTH.replace(goal={**DIRECTION, "sequence": 2, "hold": 2}),
-    "wandering poses": BOTH.replace(goal=POSE),
+    "poses": BOTH.replace(goal=POSE),
     "moving bodies": BOTH.replace(scene=random_scene(3, 12, moving=9)),
     "random bodies that move": among("both", swinging(0.35)),
     "random bodies": among("both", CLUTTER),

@@ -42,8 +42,6 @@ LOAD = {
         ("policy", "std", np.full(48, -1.0)),
         ("ars", "state.theta", None),
         ("ppo", "state.first_moment", None),
-        ("ppo", "state.first_moment", np.zeros(49, dtype=np.float32)),
-        ("ppo", "state.episodes.goal", np.zeros((4, 3))),
         ("recordings", "states_0", None),
     ],
 )

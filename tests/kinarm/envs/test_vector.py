@@ -5,6 +5,7 @@ import pickle
 
 import gymnasium
 import numpy as np
+import pinocchio as pin
 import pytest
 from gymnasium.vector import AutoresetMode, SyncVectorEnv
 
@@ -87,15 +88,22 @@ class TestAutoreset:
 
 
 def test_contacts_are_those_that_coal_finds():
+    """At the end of the refused move, or else the first on its way."""
     batch = native("NextStep", 64)
     batch.reset(seed=0)
     rng, world, refused = np.random.default_rng(0), batch.simulator.world, 0
+    model = world.contact_model
+    geometry, data = model.geometry, model.geometry.createData()
     for _ in range(100):
         infos = batch.step(np.sign(rng.uniform(-1, 1, (64, 5))))[-1]
         q, target = batch.episodes.q, batch.episodes.target
         pairs = [batch.contact_names[number] for number in infos["contact"]]
         for row in np.flatnonzero(infos["collision"]):
-            assert pairs[row] == world.contact_pair(q[row], target[row]) is not None
+            number, kinematics = infos["contact"][row], model.arm.model.createData()
+            pin.computeCollisions(model.arm.model, kinematics, geometry, data, target[row], False)
+            touching = [found.isCollision() for found in data.collisionResults]
+            first = world.contact_pair(q[row], target[row])
+            assert touching[number - 1] if any(touching) else pairs[row] == first is not None
             refused += 1
         assert all(pairs[row] is None for row in np.flatnonzero(~infos["collision"]))
     assert refused > 30
