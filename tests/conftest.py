@@ -115,11 +115,8 @@ def pytest_configure(config: pytest.Config) -> None:
         config.pluginmanager.register(Skipped(config))
 
 
-UNTRACED = {
-    *("frozen", "golden", "kernels", "test_goal_kinds", "test_known_arms"),
-    *("test_metrics", "test_moving_bodies", "test_statistics_over_seeds", "test_step_contact"),
-}
-"""Folders and modules of tests that repeat at length what others cover, as slow tests do.
+UNTRACED = {"frozen", "golden", "kernels"}
+"""Folders of tests that repeat at length what others cover, as slow tests do.
 
 Tracing takes half as long again.
 """
@@ -138,8 +135,8 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
     items.sort(key=lambda item: item.path not in files)
     if config.pluginmanager.hasplugin("_cov"):
         for item in items:
-            parts = item.path.relative_to(Path(__file__).parent).with_suffix("").parts
-            if item in slow or not UNTRACED.isdisjoint(parts):
+            folders = item.path.relative_to(Path(__file__).parent).parts
+            if item in slow or not UNTRACED.isdisjoint(folders):
                 item.add_marker("no_cover")
 
 
