@@ -141,9 +141,9 @@ class Experiment(Checked):
             raise InvalidInputError(
                 f"a search has one learner and one recipe, got {len(self.all_entries)} of both"
             )
-        if (sampler := self.search.get("sampler", "tpe")) not in SAMPLERS:
+        if self.sampler not in SAMPLERS:
             raise InvalidInputError(
-                f"search.sampler must be one of {', '.join(SAMPLERS)}, got {sampler!r}"
+                f"search.sampler must be one of {', '.join(SAMPLERS)}, got {self.sampler!r}"
             )
         if not self.searched:
             raise InvalidInputError("search names no field")
@@ -158,6 +158,11 @@ class Experiment(Checked):
             Entry(learner=learner, recipe=recipe)
             for learner, recipe in product(self.learners, self.recipes or ("",))
         )
+
+    @property
+    def sampler(self) -> Any:
+        """Who proposes settings of a search, by name."""
+        return self.search.get("sampler", next(iter(SAMPLERS)))
 
     @property
     def searched(self) -> dict[str, Any]:

@@ -45,12 +45,11 @@ def _open_search(experiment: Experiment, folder: Path) -> "optuna.study.Study":
         load_if_exists=True,
     )
     said = experiment.search
-    name = said.get("sampler", "tpe")
-    liar = {"constant_liar": True} if name == "tpe" else {}
+    liar = {"constant_liar": True} if experiment.sampler == "tpe" else {}
     # One that goes on has other random numbers than when it began.
     sequence = np.random.SeedSequence([said.get("seed", 0), len(search.trials)])
     seed = int(sequence.generate_state(1)[0])
-    search.sampler = getattr(optuna.samplers, SAMPLERS[name])(seed=seed, **liar)
+    search.sampler = getattr(optuna.samplers, SAMPLERS[experiment.sampler])(seed=seed, **liar)
     return search
 
 

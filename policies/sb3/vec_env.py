@@ -50,7 +50,7 @@ class SB3VecEnv(VecEnv):
 
     @property
     def episodes(self) -> Episodes:
-        """The episodes, one row per arm; refused before a reset and after the end."""
+        """The episodes, one row per arm; refused before a reset."""
         return self.env.episodes
 
     @property
@@ -144,7 +144,7 @@ class SB3VecEnv(VecEnv):
         return list(self.env.render() or [None] * self.num_envs)
 
     def close(self) -> None:
-        """Let go of what draws the arms; nothing works afterwards."""
+        """Let go of what draws the arms."""
         self.env.close()
 
     def get_attr(self, attr_name: str, indices: VecEnvIndices = None) -> list[Any]:

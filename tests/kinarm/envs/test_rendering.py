@@ -64,7 +64,9 @@ class TestPicture:
             *_, ended, _, info = env.step([0.0, 1.0, -1.0, 0.0, 0.0])
         assert info["collision"]
         contact = env._pictures._contacts[0]
-        assert contact.pair in env.contact_names[1:]
+        refused = env.episodes.q[0], env.episodes.target[0]
+        assert contact.pair == env.simulator.world.contact_pair(*refused)
+        assert info["contact"] > 0
         picture = env.render().astype(int)
         env._pictures._contacts.clear()
         assert np.abs(env.render() - picture).max() > 50

@@ -92,18 +92,19 @@ def test_contacts_are_those_that_coal_finds():
     batch = native("NextStep", 64)
     batch.reset(seed=0)
     rng, world, refused = np.random.default_rng(0), batch.simulator.world, 0
-    model = world.contact_model
-    geometry, data = model.geometry, model.geometry.createData()
+    arm, geometry = world.arm.model, world.contact_model.geometry
+    data, placed = arm.createData(), geometry.createData()
     for _ in range(100):
         infos = batch.step(np.sign(rng.uniform(-1, 1, (64, 5))))[-1]
         q, target = batch.episodes.q, batch.episodes.target
         pairs = [batch.contact_names[number] for number in infos["contact"]]
         for row in np.flatnonzero(infos["collision"]):
-            number, kinematics = infos["contact"][row], model.arm.model.createData()
-            pin.computeCollisions(model.arm.model, kinematics, geometry, data, target[row], False)
-            touching = [found.isCollision() for found in data.collisionResults]
-            first = world.contact_pair(q[row], target[row])
-            assert touching[number - 1] if any(touching) else pairs[row] == first is not None
+            pin.computeCollisions(arm, data, geometry, placed, target[row], False)
+            touching = [found.isCollision() for found in placed.collisionResults]
+            if any(touching):
+                assert touching[infos["contact"][row] - 1]
+            else:
+                assert pairs[row] == world.contact_pair(q[row], target[row]) is not None
             refused += 1
         assert all(pairs[row] is None for row in np.flatnonzero(~infos["collision"]))
     assert refused > 30
