@@ -1,6 +1,7 @@
 """Checkpoints of a training, from which it resumes exactly."""
 
 import json
+import math
 from collections.abc import Iterable
 from dataclasses import fields, is_dataclass
 from pathlib import Path
@@ -31,6 +32,14 @@ class Checkpoint(NamedTuple):
     state: Any
 
 
+class Progress(NamedTuple):
+    """How far a training is: the share of its iterations, and figures of the latest."""
+
+    share: float
+    mean_return: float = math.nan
+    success: float = math.nan
+
+
 def save_checkpoint(
     path: str | Path, config: TrainingConfig, state: TrainingState, beside: Any = None
 ) -> None:
@@ -50,6 +59,7 @@ def save_checkpoint(
         "config": to_plain(config),
         "arm_digest": config.problem.arm_digest,
         "iteration": state.iteration,
+        "latest": [(point.mean_return, point.success) for point in state.curve[-1:]],
     }
     arrays = arrays_of("state", state)
     if beside is not None:
@@ -88,11 +98,12 @@ def load_beside(path: Path, kind: type[T]) -> T:
         return value
 
 
-def load_share(path: Path) -> float:
-    """Read which share of the iterations is done."""
+def load_progress(path: Path) -> Progress:
+    """Read how far the training is."""
     header, _ = load_archive(path, *ARCHIVE, PolicyFileError, unless=("state.", "beside."))
     with reading(repr(str(path)), "checkpoint", PolicyFileError):
-        return float(header["iteration"] / header["config"]["iterations"])
+        share = header["iteration"] / header["config"]["iterations"]
+        return Progress(share, *(number for latest in header["latest"] for number in latest))
 
 
 def arrays_of(name: str, value: Any) -> dict[str, NDArray[Any]]:

@@ -13,7 +13,6 @@ from kinarm.errors import InvalidInputError, UnknownNameError
 from kinarm.observation_layout import ObservationLayout
 from kinarm.policies.normalizer import Normalizer
 from kinarm.policies.policy import Policy
-from kinarm.policies.training import CHECKPOINT
 from kinarm.problem import ProblemLike, ReachProblem
 
 BEST = "best"
@@ -96,10 +95,9 @@ def policy_files(name_or_file: str | Path, problem: ProblemLike | None = None) -
     if files:
         return files
     if is_folder(path):
-        found = [each for each in path.glob("*.npz") if not each.name.endswith(CHECKPOINT)]
-        if not found:
+        if not (found := _in_order(path.glob("*.npz"))):
             raise InvalidInputError(f"there is no policy (.npz) in the folder {str(path)!r}")
-        return tuple(_in_order(found))
+        return tuple(found)
     if is_file(path) or path.suffix == ".npz" or path.parent != Path():
         return (path,)
     groups = dict.fromkeys(group_of(name) for name in policy_names())

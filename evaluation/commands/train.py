@@ -14,11 +14,13 @@ from kinarm._fields import Checked
 from kinarm._files import shipped_files
 from kinarm._parser import Parser
 from kinarm.errors import FROM_ZERO, InvalidInputError
+from kinarm.policies.config import TrainingConfig
 from kinarm.policies.learners import Learner, find_learner, learner_names
-from kinarm.policies.training import TrainRequest, curve_path
+from kinarm.policies.recipes import recipe
+from kinarm.problem_options import ProblemOptions
 
 if TYPE_CHECKING:
-    from kinarm.evaluation.experiments.seeds import TrainedSeed
+    from kinarm.evaluation.experiments.training import Trained
 
 PROG = "kinarm-train"
 
@@ -28,6 +30,9 @@ CIRCUMSTANCES = ("problem", "seed", "recipe", "algorithm")
 SETTINGS = "settings of the learner (defaults of the recipe {})"
 
 MOST_SEEDS = 1000
+
+TRAININGS = ".training"
+"""Folder of the trainings, beside the policies; the ending of a single one's."""
 
 
 def seeds_of(text: str) -> tuple[int, ...]:
@@ -40,6 +45,69 @@ def seeds_of(text: str) -> tuple[int, ...]:
     raise InvalidInputError(
         f"must be a number (5) or a rising range (5-9), 1 to {MOST_SEEDS} seeds, got {text!r}"
     )
+
+
+@dataclass(frozen=True, kw_only=True)
+class TrainRequest(ProblemOptions):
+    """A training, from its settings to the files that it leaves.
+
+    Parameters
+    ----------
+    learner : str
+        Name of the learner.
+    recipe : str, optional
+        Name of settings, or a TOML file with some.
+    seed : int, optional
+        Seed of all randomness.
+    settings : mapping
+        Settings of the learner that replace those of the recipe.
+    out : Path
+        File of the policy, with learning curve beside it; with --seeds, folder
+        of the policies.
+    overwrite : bool
+        Replace an earlier policy.
+    """
+
+    learner: str
+    recipe: str | None = field(default=None, metadata={"metavar": "NAME_OR_FILE"})
+    seed: int | None = field(default=None, metadata=FROM_ZERO)
+    settings: dict[str, Any] = field(default_factory=dict)
+    out: Path | str = field(metadata={"metavar": "FILE.npz"})
+    overwrite: bool = False
+
+    GROUPS: ClassVar = {
+        "training": "recipe seed",
+        "output": "out overwrite",
+        **ProblemOptions.GROUPS,
+    }
+    DEFAULTS: ClassVar = {
+        **ProblemOptions.DEFAULTS,
+        "recipe": "the first one",
+        "seed": "0",
+        "problem": "the recipe's: right",
+    }
+
+    def run(self) -> "Trained":
+        """Train, and write the policy and its learning curve.
+
+        The state is kept every few seconds in a folder beside the policy, such as
+        ``right.training``, until the training is finished: after an interruption,
+        the same request goes on from there.
+        """
+        from kinarm.evaluation.experiments.training import train_all
+
+        config, out = self.config(), Path(self.out)
+        outs, folder = {config.seed: out}, out.with_suffix(TRAININGS)
+        (trained,) = train_all(config, outs, folder, overwrite=self.overwrite, keep=False)
+        return trained
+
+    def config(self) -> TrainingConfig:
+        """Settings of the training: the recipe's, with replacements."""
+        problem = self.resolve(default=recipe(self.learner, self.recipe).problem)
+        config: TrainingConfig = recipe(
+            self.learner, self.recipe, problem=problem, seed=self.seed, **self.settings
+        )
+        return config
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -77,7 +145,7 @@ class SeedsRequest(Checked):
             folder = Path(self.training.out).with_suffix("")
             raise InvalidInputError(f"with --seeds, --out is a folder: --out {folder}")
 
-    def run(self) -> "tuple[TrainedSeed, ...]":
+    def run(self) -> "tuple[Trained, ...]":
         """Train, and write a policy and a learning curve for each seed.
 
         Files are named as ``ars-tuned-both-seed0.npz``. The same request again
@@ -94,9 +162,13 @@ class SeedsRequest(Checked):
         KeyboardInterrupt
             If it is interrupted; the message says how to go on.
         """
-        from kinarm.evaluation.experiments.seeds import train_seeds
+        from kinarm.evaluation.experiments.training import shared_name, train_all
 
-        return train_seeds(self.training, self.seeds, self.jobs)
+        config, folder = self.training.config(), Path(self.training.out)
+        name = shared_name(config)
+        outs = {seed: folder / f"{name}-seed{seed}.npz" for seed in self.seeds}
+        overwrite, place = self.training.overwrite, folder / TRAININGS / name
+        return train_all(config, outs, place, jobs=self.jobs, overwrite=overwrite)
 
 
 def build_parser(named: str | None = None) -> Parser:
@@ -151,31 +223,18 @@ def _train(options: argparse.Namespace) -> None:
     given = given_options(options, find_learner(options.learner).config)
     settings = {name: value for name, value in given.items() if name not in CIRCUMSTANCES}
     request = TrainRequest(**given_options(options, TrainRequest), settings=settings)
-    seeds = given_options(options, SeedsRequest)
-    if "seeds" in seeds:
-        for seed, out, last in SeedsRequest(training=request, **seeds).run():
-            said = "finished earlier"
-            if last is not None:
-                said = f"return {last.mean_return:+.3f}, success {100 * last.success:.0f} %"
-            sys.stdout.write(f"seed {seed}: {said}; written: {out}\n")
-        trained = f"{request.out}/"
-    elif "jobs" in seeds:
+    several = given_options(options, SeedsRequest)
+    if "jobs" in several and "seeds" not in several:
         raise InvalidInputError("--jobs goes with --seeds")
-    else:
-        _train_one(request)
-        trained = str(request.out)
-    name = shlex.quote(trained)
+    all_of_them = SeedsRequest(training=request, **several).run() if several else (request.run(),)
+    for seed, out, curve in all_of_them:
+        said = "finished earlier"
+        if curve:
+            last = curve[-1]
+            said = (
+                f"{last.environment_steps / 1e6:.2f} million steps in {last.wall_time:.1f} s, "
+                f"return {last.mean_return:+.3f}, success {100 * last.success:.0f} %"
+            )
+        sys.stdout.write(f"seed {seed}: {said}; written: {out}\n")
+    name = shlex.quote(f"{request.out}/" if several else str(request.out))
     sys.stdout.write(f"next: kinarm-eval {name}, kinarm-replay {name}\n")
-
-
-def _train_one(request: TrainRequest) -> None:
-    """Train a policy, and say how good it is."""
-    curve = request.run().curve
-    last = curve[-1]
-    sys.stdout.write(
-        f"{len(curve)} iterations, {last.environment_steps / 1e6:.2f} million steps in "
-        f"{last.wall_time:.1f} s\n"
-        f"last iteration: mean return {last.mean_return:+.3f}, "
-        f"success {100 * last.success:.0f} %\n"
-        f"written: {request.out}, {curve_path(request.out)}\n"
-    )

@@ -10,14 +10,14 @@ from typing import Any
 import tomli_w
 
 from kinarm._fields import from_plain, to_plain
-from kinarm._files import check_folder, only_writer, write_atomically, write_text
+from kinarm._files import check_folder, is_being_written, only_writer, write_atomically, write_text
 from kinarm.errors import InvalidInputError, KinarmError, PolicyFileError
 from kinarm.evaluation.experiments.curve import CurveSoFar, Made
 from kinarm.evaluation.experiments.executors import Failure
 from kinarm.evaluation.experiments.experiment import Experiment
 from kinarm.evaluation.experiments.plan import Run
 from kinarm.evaluation.experiments.runs import Start, TaskResult, TrainedRun, load_run
-from kinarm.policies.checkpoint import load_beside, load_checkpoint, load_share
+from kinarm.policies.checkpoint import Progress, load_beside, load_checkpoint, load_progress
 from kinarm.policies.provenance import package_versions, source_commit
 
 SPECIFICATION = "study.toml"
@@ -64,7 +64,7 @@ class Store:
         if marker.exists() and (there := Experiment.load(marker).name) != experiment.name:
             raise InvalidInputError(
                 f"{str(self.folder)!r} is of the experiment {there!r}, not of "
-                f"{experiment.name!r}: name another folder with --out"
+                f"{experiment.name!r}: name another --out, or delete this folder"
             )
 
     def save(self, run: Run, result: TaskResult | Failure) -> None:
@@ -79,6 +79,19 @@ class Store:
         write_atomically(self.path("runs", run), lambda file: file.write(result.content))
         failure.unlink(missing_ok=True)
         self.path("checkpoints", run).unlink(missing_ok=True)
+
+    def clear(self, runs: Iterable[Run]) -> None:
+        """Remove trainings, and the folder if nothing else lies there; not one that goes on."""
+        goes_on = any(self.path("checkpoints", run).exists() for run in runs)
+        if goes_on or is_being_written(self.folder):
+            return
+        with suppress(OSError):
+            for kind in FOLDERS:
+                for run in runs:
+                    self.path(kind, run).unlink(missing_ok=True)
+                (self.folder / kind).rmdir()
+            (self.folder / SPECIFICATION).unlink()
+            self.folder.rmdir()
 
     def load(self, runs: Iterable[Run]) -> dict[Run, TrainedRun]:
         """Read the trainings that are finished."""
@@ -95,13 +108,13 @@ class Store:
             return Start(load_checkpoint(path).state, load_beside(path, CurveSoFar))
         return None
 
-    def shares(self, runs: Iterable[Run]) -> list[float]:
-        """Finished shares of trainings under way, by their checkpoints."""
+    def progress(self, runs: Iterable[Run]) -> list[Progress]:
+        """How far trainings under way are, by their checkpoints."""
         keys, found = {run.key for run in runs}, []
         for path in self.folder.glob("checkpoints/*.npz"):
             if path.stem in keys:
                 with suppress(PolicyFileError):
-                    found.append(load_share(path))
+                    found.append(load_progress(path))
         return found
 
     def made(self, run: Run) -> Made:

@@ -176,9 +176,8 @@ class Study:
         over = Event()
 
         def show() -> None:
-            shares = self.store.shares(runs)
-            under_way = [f"{len(shares)} under way {100 * np.mean(shares):.0f} %"] if shares else []
-            line.update(len(done) + sum(shares), [*under_way, *done[-1:]])
+            shares, words = self._under_way(runs)
+            line.update(len(done) + shares, [*words, *done[-1:]])
 
         def show_again() -> None:
             while not over.wait(CHECKPOINT_SECONDS):
@@ -194,6 +193,16 @@ class Study:
                 over.set()
                 thread.join()
 
+    def _under_way(self, runs: Sequence[Run]) -> tuple[float, list[str]]:
+        """Sum of the shares that trainings under way have done, and how far they are in words."""
+        if not (found := self.store.progress(runs)):
+            return 0.0, []
+        share, mean_return, success = np.mean(found, axis=0)
+        words = [f"{len(found)} under way {100 * share:.0f} %"]
+        if len(found) == 1:
+            words.append(f"return {mean_return:+.3f}, success {100 * success:.0f} %")
+        return len(found) * share, words
+
     def refresh(self) -> None:
         """Read the folder again."""
         if self.experiment.search:
@@ -206,8 +215,7 @@ class Study:
         remain = [run for run in self.runs if not self.store.path("runs", run).exists()]
         finished = len(self.runs) - len(remain)
         told = [f"{self.experiment.name}: {finished} of {len(self.runs)} trainings finished"]
-        if shares := self.store.shares(remain):
-            told[0] += f", {len(shares)} under way {100 * np.mean(shares):.0f} %"
+        told[0] = ", ".join((told[0], *self._under_way(remain)[1]))
         if remain and is_being_written(self.store.folder):
             told[0] += ", running"
         elif remain:

@@ -140,7 +140,7 @@ def arrays(folder: Path) -> dict[str, bytes]:
 def kill(command: str, count: int, seed: int, tally: Tally) -> None:
     """Kill a run up to `KILLS` times, let it go on to its end, and compare it with another.
 
-    A training goes on by ``--resume`` from its checkpoint, and a study by the same command.
+    Trainings and studies go on by the same command.
     """
     rng = np.random.default_rng(seed)
     with TemporaryDirectory() as name:
@@ -152,11 +152,7 @@ def kill(command: str, count: int, seed: int, tally: Tally) -> None:
         with TemporaryDirectory() as name:
             folder = Path(name)
             for last in (False,) * KILLS + (True,):
-                begun = (folder / "p.checkpoint.npz").exists()
-                going_on = (
-                    " --resume --overwrite" if begun else " --overwrite" * ("p.npz" in command)
-                )
-                with started(command + going_on, folder) as process:
+                with started(command + " --overwrite" * ("p.npz" in command), folder) as process:
                     if not last:
                         time.sleep(rng.uniform(0, 0.6 * seconds))
                         process.kill()

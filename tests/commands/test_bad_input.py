@@ -38,7 +38,6 @@ def test_eval_refuses(run, arguments, words):
         ("ars --top-directions 25", ["top_directions", "24"]),
         ("ars --noise nan", ["--noise", "finite"]),
         ("ars --reward-collision 2", ["collision", "other sign"]),
-        ("ars --resume", ["nothing to resume"]),
         ("ppo --batch-size 300", ["batch_size", "2000 steps"]),
         ("ppo --net-arch 0", ["net_arch"]),
         ("ppo --directions 3", ["--directions"]),

@@ -9,8 +9,7 @@ from kinarm.evaluation.commands.bench import BenchmarkRequest
 from kinarm.evaluation.commands.replay import ReplayRequest
 from kinarm.evaluation.commands.reproduce import ReproductionRequest
 from kinarm.evaluation.commands.study import StudyRequest
-from kinarm.evaluation.commands.train import SeedsRequest
-from kinarm.policies.training import TrainRequest
+from kinarm.evaluation.commands.train import SeedsRequest, TrainRequest
 from kinarm.problem import PROBLEMS
 
 LONG = (

@@ -12,8 +12,9 @@ import pytest
 from equal_policies import check_equal
 from refusals import check_refused
 
-from kinarm.policies import Policy, recipe, train_policy
-from kinarm.policies.checkpoint import load_checkpoint, save_checkpoint
+from kinarm.evaluation.commands.train import TrainRequest
+from kinarm.evaluation.experiments import runs
+from kinarm.policies import Policy, load_checkpoint, recipe, train_policy
 from kinarm.problem import PROBLEMS
 from kinarm.task import RewardWeights
 
@@ -23,9 +24,9 @@ LONG_OPTIONS = ["--iterations", "1000", "--directions", "2", "--top-directions",
 TRAIN_WITH_FREQUENT_CHECKPOINTS = """
 import signal, sys
 from kinarm.evaluation.commands import train
-from kinarm.policies import training
+from kinarm.evaluation.experiments import runs
 signal.signal(signal.SIGINT, signal.default_int_handler)  # a background job may inherit "ignore"
-training.CHECKPOINT_SECONDS = 0.1
+runs.CHECKPOINT_SECONDS = 0.1
 train.main(sys.argv[1:])
 """
 
@@ -35,11 +36,8 @@ def read_curve(path: Path) -> list[dict[str, str]]:
         return list(csv.DictReader(file))
 
 
-def stop_after(iteration: int, config, path: Path) -> None:
-    """Leave the checkpoint of a training that was stopped after some iterations."""
-    states = []
-    train_policy(config, on_iteration=states.append)
-    save_checkpoint(path, config, states[iteration - 1])
+def contents(folder: Path) -> dict[Path, bytes]:
+    return {path: path.read_bytes() for path in folder.rglob("*") if path.is_file()}
 
 
 def test_policy_and_curve_are_those_of_the_library(run, tmp_path):
@@ -121,73 +119,107 @@ def test_a_recipe_and_a_problem_from_files(run, tmp_path):
     assert made.problem == PROBLEMS["left"].replace(name="near", tolerance=0.1, horizon=9).pinned
 
 
-def test_what_is_there_is_replaced_on_demand_alone(run, tmp_path):
-    """A policy, and the checkpoint of a training that goes on."""
-    out, checkpoint = tmp_path / "p.npz", tmp_path / "p.checkpoint.npz"
+def test_a_policy_is_replaced_on_demand_alone(run, tmp_path):
+    out = tmp_path / "p.npz"
+    out.write_bytes(b"something")
     arguments = ("kinarm-train", "ars", "--iterations", 2, "--seed", 1, "--out", out)
-    stop_after(2, recipe("ars", "paper", iterations=4), checkpoint)
-    before = checkpoint.read_bytes()
-    check_refused(run(*arguments), "--resume")
-    checkpoint.rename(out)
     check_refused(run(*arguments), "--overwrite")
-    assert [(path, path.read_bytes()) for path in tmp_path.iterdir()] == [(out, before)]
+    assert [(path, path.read_bytes()) for path in tmp_path.iterdir()] == [(out, b"something")]
     assert run(*arguments, "--overwrite").status == 0
     assert Policy.load(out).provenance.seed == 1
 
 
-@pytest.mark.parametrize(
-    ("option", "told"),
-    [
-        ("--arm paper_flange", "arm"),
-        ("--seed 1 --noise 0.5", "with another noise and seed: leave out"),
-    ],
-)
-def test_other_settings_are_refused_when_resuming(run, tmp_path, option, told):
+def test_what_is_interrupted_goes_on_with_the_same_settings_alone(run, tmp_path, monkeypatch):
     """A setting that would be ignored is an error, and the checkpoint stays as it is."""
-    checkpoint = tmp_path / "p.checkpoint.npz"
-    stop_after(2, recipe("ars", "paper", iterations=4), checkpoint)
-    before = checkpoint.read_bytes()
-    words = ("--out", tmp_path / "p.npz", "--resume", *option.split())
-    answer = run("kinarm-train", "ars", *words)
-    assert (answer.status, answer.out) == (2, "")
-    assert len(answer.err.splitlines()) == 1
-    assert told in answer.err
-    if "leave out" in told:
-        assert f"delete {str(checkpoint)!r} to train anew" in answer.err
-    assert checkpoint.read_bytes() == before
-    assert not (tmp_path / "p.npz").exists()
+    monkeypatch.setattr(runs, "CHECKPOINT_SECONDS", 0.0)
+    save, saved = runs.save_checkpoint, []
+
+    def interrupt(path, config, state, curve):
+        save(path, config, state, curve)
+        saved.append(state.iteration)
+        if saved == [1, 2]:
+            raise KeyboardInterrupt
+
+    monkeypatch.setattr(runs, "save_checkpoint", interrupt)
+    arguments = ("kinarm-train", "ars", "--iterations", 4, "--out", tmp_path / "p.npz")
+    answer = run(*arguments)
+    assert answer.status == 130
+    assert answer.err.splitlines()[-1] == (
+        "kinarm-train: interrupted; what is finished is kept, and the same command goes on"
+    )
+    before = contents(tmp_path)
+    for change in ("--arm paper_flange", "--seed 1", "--noise 0.5", "--tolerance 0.1 --overwrite"):
+        folder = str(tmp_path / "p.training")
+        check_refused(
+            run(*arguments, *change.split()), f"{folder!r} is of the experiment", "delete"
+        )
+        assert contents(tmp_path) == before
+    answer = run(*arguments)
+    assert answer.status == 0, answer.err
+    assert saved == [1, 2, 3, 4]
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["p.curve.csv", "p.npz"]
+    check_equal(
+        Policy.load(tmp_path / "p.npz"), train_policy(recipe("ars", "paper", iterations=4)).policy
+    )
 
 
-def interrupt(process: subprocess.Popen, checkpoint: Path) -> str:
+def test_what_fails_or_ends_before_a_checkpoint_leaves_nothing(run, tmp_path, monkeypatch):
+    """Nothing of its own: other files stay."""
+    policy, folder = tmp_path / "first.npz", tmp_path / "p.training"
+    train_policy(recipe("ars", "paper", iterations=1)).policy.save(policy)
+    folder.mkdir()
+    (folder / "mine.txt").write_text("mine")
+    before = contents(tmp_path)
+    options = ("kinarm-train", "ppo", "--initial-policy", policy, "--out", tmp_path / "p.npz")
+    check_refused(run(*options), "initial_policy")
+
+    def interrupt(*_):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(runs, "training_states", interrupt)
+    assert run("kinarm-train", "ars", "--out", tmp_path / "p.npz").status == 130
+    assert contents(tmp_path) == before
+
+
+def test_a_request_gives_policy_and_curve(tmp_path):
+    out = tmp_path / "p.npz"
+    trained = TrainRequest(learner="ars", settings={"iterations": 2}, out=out).run()
+    expected = train_policy(recipe("ars", "paper", iterations=2))
+    assert (trained.seed, trained.out) == (0, out)
+    assert [point.mean_return for point in trained.curve] == [
+        point.mean_return for point in expected.curve
+    ]
+    check_equal(trained.policy, expected.policy)
+
+
+def interrupt(process: subprocess.Popen, folder: Path) -> str:
     """Send Ctrl-C once a training has got somewhere; return what it says on standard error."""
-    while not (checkpoint.exists() and load_checkpoint(checkpoint)[1].iteration >= 100):
+    while not any(load_checkpoint(path)[1].iteration >= 100 for path in folder.glob("*.npz")):
         assert process.poll() is None, process.stderr.read()
         time.sleep(0.02)
     process.send_signal(signal.SIGINT)
     return process.communicate(timeout=60)[1]
 
 
-def test_ctrl_c_and_resume_give_the_uninterrupted_policy(run, tmp_path):
-    out, checkpoint = tmp_path / "p.npz", tmp_path / "p.checkpoint.npz"
+def test_ctrl_c_and_the_same_command_give_the_uninterrupted_policy(run, tmp_path):
+    out, checkpoints = tmp_path / "p.npz", tmp_path / "p.training" / "checkpoints"
+    arguments = ("ars", "--out", str(out), *LONG_OPTIONS)
     process = subprocess.Popen(
-        [
-            *(sys.executable, "-c", TRAIN_WITH_FREQUENT_CHECKPOINTS, "ars", "--out", str(out)),
-            *LONG_OPTIONS,
-        ],
+        [sys.executable, "-c", TRAIN_WITH_FREQUENT_CHECKPOINTS, *arguments],
         cwd=ROOT,
         env={**os.environ, "COLUMNS": "100"},
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
     )
-    errors = interrupt(process, checkpoint)
+    errors = interrupt(process, checkpoints)
     assert process.returncode == 130
     assert "Traceback" not in errors
     assert errors.splitlines()[-1].startswith("kinarm-train: interrupted")
-    _, state = load_checkpoint(checkpoint)
-    assert 100 <= state.iteration < LONG["iterations"]
+    (checkpoint,) = checkpoints.iterdir()
+    assert 100 <= load_checkpoint(checkpoint)[1].iteration < LONG["iterations"]
     assert not out.exists()
 
-    assert run("kinarm-train", "ars", "--out", out, "--resume").status == 0
-    assert not checkpoint.exists()
+    assert run("kinarm-train", *arguments).status == 0
+    assert not checkpoints.exists()
     check_equal(Policy.load(out), train_policy(recipe("ars", "paper", **LONG)).policy)

@@ -37,7 +37,6 @@ EXCEPTIONS = {
     r"kinarm-study (learners|skills|ars_factors|search)": "trains for hours; tests/frozen",
     r"kinarm-train .*search/best": "needs what that search found",
     r"kinarm-eval .*model\.zip": "needs such a model; tests/docs/test_policies.py",
-    r"kinarm-train .*--resume": "needs an interruption; tests/commands/test_train_command.py",
 }
 """Commands and blocks of Python that are not run here, by how they begin, and why."""
 

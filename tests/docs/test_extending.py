@@ -17,9 +17,9 @@ from pages import ROOT, named_blocks
 
 from kinarm.evaluation import Study
 from kinarm.evaluation.commands import evaluate, replay, train
-from kinarm.evaluation.experiments import table
+from kinarm.evaluation.experiments import runs, table
 from kinarm.evaluation.experiments.page import write_all
-from kinarm.policies import learners, load_policy, training
+from kinarm.policies import learners, load_policy
 from kinarm.problem import ReachProblem
 
 BLOCKS = named_blocks(ROOT / "docs" / "how-to" / "extending.md")
@@ -112,7 +112,7 @@ def test_a_registered_learner_resumes_exactly(
 ) -> None:
     command = "kinarm-train toy --iterations 12 --out {}.npz"
     run(command.format("whole"))
-    states = training.training_states
+    states = runs.training_states
 
     def interrupted(*given: object, **options: object) -> Iterator[learners.TrainingState]:
         for state in states(*given, **options):
@@ -120,12 +120,13 @@ def test_a_registered_learner_resumes_exactly(
                 raise KeyboardInterrupt
             yield state
 
-    monkeypatch.setattr(training, "training_states", interrupted)
+    monkeypatch.setattr(runs, "CHECKPOINT_SECONDS", 0.0)
+    monkeypatch.setattr(runs, "training_states", interrupted)
     with pytest.raises(SystemExit) as end:
         train.main(shlex.split(command.format("halves"))[1:])
     assert end.value.code == 130
-    monkeypatch.setattr(training, "training_states", states)
-    run(f"{command.format('halves')} --resume")
+    monkeypatch.setattr(runs, "training_states", states)
+    run(command.format("halves"))
     whole, halves = (load_policy(folder / f"{name}.npz") for name in ("whole", "halves"))
     np.testing.assert_array_equal(whole.layers[0].weights, halves.layers[0].weights)
 

@@ -118,7 +118,8 @@ class TestGoingOn:
         with pytest.raises(KeyboardInterrupt):
             study.run(executor=Counting())
         monkeypatch.undo()
-        assert "0 of 1 trainings finished, 1 under way 67 %, stopped" in study.status()[0]
+        assert "0 of 1 trainings finished, 1 under way 67 %, return -0.499" in study.status()[0]
+        assert "success 0 %, stopped" in study.status()[0]
         executor = Counting()
         study.run(executor=executor)
         assert [task.start.state.iteration for task in executor.tasks] == [2]
