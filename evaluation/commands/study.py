@@ -39,8 +39,6 @@ class RunningOptions(Checked):
         Trainings of one element of a Slurm array.
     minutes : int
         Time limit of an element of a Slurm array [min].
-    partition : str
-        Partition of Slurm.
     """
 
     jobs: int | None = None
@@ -48,17 +46,13 @@ class RunningOptions(Checked):
     slurm: bool = False
     bundle: int | None = None
     minutes: int | None = None
-    partition: str | None = None
 
-    GROUPS: ClassVar[Mapping[str, str]] = {
-        "where trainings run": "jobs ray slurm bundle minutes partition"
-    }
+    GROUPS: ClassVar[Mapping[str, str]] = {"where trainings run": "jobs ray slurm bundle minutes"}
     DEFAULTS: ClassVar[Mapping[str, str]] = {
         "jobs": "one a processor",
         "ray": "this machine without Ray",
         "bundle": "1",
         "minutes": "240",
-        "partition": "the cluster's",
     }
 
     def __post_init__(self) -> None:
@@ -67,7 +61,7 @@ class RunningOptions(Checked):
             raise InvalidInputError("--ray and --slurm exclude each other")
         if self.slurm and self.jobs is not None:
             raise InvalidInputError("--jobs is for this machine: it does not go with --slurm")
-        for name in ("bundle", "minutes", "partition"):
+        for name in ("bundle", "minutes"):
             if getattr(self, name) is not None and not self.slurm:
                 raise InvalidInputError(f"--{name} goes with --slurm")
 
@@ -79,8 +73,7 @@ class RunningOptions(Checked):
         if self.ray is not None:
             return RayExecutor(self.ray, self.jobs, threads)
         if self.slurm:
-            place, minutes = folder / "slurm", self.minutes or 240
-            return SlurmExecutor(place, self.bundle or 1, minutes, threads, self.partition)
+            return SlurmExecutor(folder / "slurm", self.bundle or 1, self.minutes or 240, threads)
         return LocalExecutor(self.jobs or available_threads(), threads)
 
 

@@ -143,10 +143,6 @@ class SlurmExecutor:
         it was.
     threads : int
         Processors of an element.
-    partition : str, optional
-        Partition of the cluster.
-    at_once : int
-        Most elements that run at the same time.
     cluster : {"slurm", "local"}
         ``"local"`` runs the same jobs as processes of this machine.
     """
@@ -155,8 +151,6 @@ class SlurmExecutor:
     bundle: int = 1
     minutes: int = 240
     threads: int = 1
-    partition: str | None = None
-    at_once: int = 256
     cluster: str = "slurm"
 
     def map(
@@ -171,11 +165,7 @@ class SlurmExecutor:
         try:
             executor = submitit.AutoExecutor(folder=self.folder, cluster=self.cluster)
             executor.update_parameters(
-                name="kinarm",
-                timeout_min=self.minutes,
-                cpus_per_task=self.threads,
-                slurm_array_parallelism=self.at_once,
-                **({"slurm_partition": self.partition} if self.partition else {}),
+                name="kinarm", timeout_min=self.minutes, cpus_per_task=self.threads
             )
             with executor.batch():
                 for part in parts:
