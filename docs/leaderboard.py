@@ -2,21 +2,13 @@
 
 ``python -m docs.leaderboard data/leaderboard/mine.toml`` scores this submission alone, and leaves
 other rows as they are. The record lies beside the shipped policies; `docs.tables` makes pages of
-it, and `kinarm.policies.library.best_policy` looks the best shipped policy up. The trials have
-their own seed, so that no policy is chosen by the trials that evaluations show.
-
-The best: the seed that reaches most goals of all is partly the luckiest, and more seeds have more
-luck. So recipes are compared first, by what all their seeds reach; then the seeds of the best
-recipe. Both times the order is the same. The first is the one that reaches most goals. As good is
-what lies within its 95 % interval: the first itself might reach no more with other trials, and as a
-recipe with other seeds. A wide interval of another one does not count in its favour. Of those that
-are as good, the one with the smallest step ratio is best.
+it. The trials have their own seed, so that no policy is chosen by the trials that evaluations show.
 """
 
 import json
 import sys
 from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from contextlib import chdir
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -26,21 +18,18 @@ import numpy as np
 
 from kinarm._fields import Checked, from_plain, read_toml
 from kinarm._files import first_line, write_text
-from kinarm.episodes import Rollouts
 from kinarm.errors import FROM_ZERO, InvalidInputError
 from kinarm.evaluation import EvaluationRequest, find_contestants
 from kinarm.evaluation.contestants import ORACLE, SHIELDED
 from kinarm.evaluation.evaluation import Evaluation, outcomes_of
 from kinarm.evaluation.metrics import METRICS
-from kinarm.evaluation.outcomes import Outcomes, failure_causes
+from kinarm.evaluation.outcomes import failure_causes
 from kinarm.evaluation.statistics import share_over_seeds
 from kinarm.evaluation.summary import pool
-from kinarm.policies.library import LEADERBOARD, group_of
-from kinarm.policies.oracle import OracleSolutions
 from kinarm.problem import PROBLEMS
 
 DATA = Path(__file__).parent.parent / "data"
-RECORD = DATA / "policies" / LEADERBOARD
+RECORD = DATA / "policies" / "leaderboard.json"
 SUBMISSIONS = DATA / "leaderboard"
 
 TRIALS, SEED = 10_000, 20_161
@@ -168,49 +157,6 @@ def scored(files: Sequence[Path], trials: int = TRIALS) -> tuple[list[dict[str, 
     return rows, whole
 
 
-def best_of(found: Mapping[str, Rollouts], bounds: OracleSolutions) -> str:
-    """Name of the best of some policies: of the best recipe, the best seed.
-
-    Parameters
-    ----------
-    found : mapping of str to Rollouts
-        What each did in the same trials, by its name.
-    bounds : OracleSolutions
-        Of the first trials.
-    """
-    recipes: dict[str, dict[str, Rollouts]] = {}
-    for name, did in found.items():
-        recipes.setdefault(group_of(name), {})[name] = did
-    recipe = _leader({name: list(seeds.values()) for name, seeds in recipes.items()}, bounds)
-    return _leader({name: [did] for name, did in recipes[recipe].items()}, bounds)
-
-
-def _leader(candidates: Mapping[str, list[Rollouts]], bounds: OracleSolutions) -> str:
-    """The best candidate, of each of which there are one or several training seeds."""
-    names = sorted(candidates)
-    hits = {name: np.array([did.success for did in candidates[name]]) for name in names}
-    shares = {name: float(hits[name].mean()) for name in names}
-    first = max(names, key=lambda name: shares[name])
-    low, _ = share_over_seeds(hits[first]).ci95 or (shares[first], shares[first])
-    as_good = [name for name in names if shares[name] >= low]
-    ratio = METRICS["step_ratio"].formula
-    ratios = {name: ratio(Outcomes(tuple(candidates[name]), bounds)) or np.inf for name in as_good}
-    return min(as_good, key=lambda name: (ratios[name], -shares[name]))
-
-
-def best(evaluations: Iterable[Evaluation]) -> dict[str, str]:
-    """Name of the best policy of each problem."""
-    faced: dict[str, dict[str, Evaluation]] = {}
-    for each in evaluations:
-        if each.contestant.policy is not None and not each.contestant.has_shield:
-            faced.setdefault(each.problem.name, {})[each.contestant.name] = each
-    return {
-        problem: best_of({name: each.rollouts for name, each in found.items()}, bounds)
-        for problem, found in faced.items()
-        if (bounds := next(iter(found.values())).bounds) is not None
-    }
-
-
 def main(files: Sequence[Path]) -> None:
     """Score, and write the record; submissions alone if some are named."""
     submitted = sorted(each for each in SUBMISSIONS.iterdir() if each.suffix in (".toml", ".npz"))
@@ -222,8 +168,7 @@ def main(files: Sequence[Path]) -> None:
         record["rows"] = [*kept, *rows]
     else:
         shipped = EvaluationRequest(trials=TRIALS, seed=SEED, shield=True).evaluate()
-        record = {"trials": TRIALS, "seed": SEED, "best": best(shipped)}
-        record["rows"] = [*rows_of(shipped), *rows]
+        record = {"trials": TRIALS, "seed": SEED, "rows": [*rows_of(shipped), *rows]}
     write_text(RECORD, json.dumps(record, indent=1) + "\n")
     sys.exit(not whole)
 

@@ -64,8 +64,6 @@ class Contestant:
         How it was made, and its training seed.
     policy, source : Policy or None, Path or None
         The trained policy, if it is one, and its file.
-    best_for : tuple of ReachProblem
-        What it was chosen for as the best shipped policy.
     actor : Actor, optional
         What chooses its actions in Python, to run in a wrapper.
     remarks : tuple of str
@@ -81,7 +79,6 @@ class Contestant:
     seed: int | None = None
     policy: Policy | None = None
     source: Path | None = None
-    best_for: tuple[ReachProblem, ...] = ()
     actor: Actor | None = None
     remarks: tuple[str, ...] = ()
     has_shield: bool = False

@@ -33,13 +33,12 @@ def find_contestants(
     ----------
     name_or_file : str or Path
         A baseline, ``"oracle"``, a shipped policy, a group of them (all
-        training seeds), ``"best"``, a policy file, a model of Stable-Baselines3
+        training seeds), a policy file, a model of Stable-Baselines3
         (.zip), a folder of either, or ``"module:function"``. A model and a
         module run code: open only those that you trust. ``+shield`` in a name
         means the same policies behind a shield.
     problem : ReachProblem, str or Path, optional
-        What a model is for, as its file does not say, or the best shipped
-        policy; others say it themselves.
+        What a model is for, as its file does not say; others say it themselves.
     vec_normalize : str or Path, optional
         Statistics of a model's observations; see
         `kinarm.policies.Policy.from_sb3`.
@@ -62,7 +61,7 @@ def find_contestants(
     elif is_import_path(text):
         found = (_imported_contestant(text),)
     else:
-        found = _policy_contestants(name_or_file, problem)
+        found = _policy_contestants(name_or_file)
     if wrapper is None:
         return found
     if callable(wrapper):
@@ -78,12 +77,10 @@ def _name_of(function: Any) -> str:
     return getattr(function, "__name__", None) or type(function).__name__
 
 
-def _policy_contestants(
-    name_or_file: str | Path, problem: ProblemLike | None
-) -> tuple[Contestant, ...]:
+def _policy_contestants(name_or_file: str | Path) -> tuple[Contestant, ...]:
     """Policies of a name, file or folder."""
     try:
-        paths = policy_files(name_or_file, problem)
+        paths = policy_files(name_or_file)
     except UnknownNameError as error:
         available = (*UNTRAINED, *error.available, "path/to/model.zip", "module:function")
         raise UnknownNameError(error.kind, error.given, available) from None

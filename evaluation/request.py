@@ -38,10 +38,10 @@ class EvaluationRequest(ProblemOptions, TableOptions):
     Parameters
     ----------
     policies : tuple of str
-        Shipped policy, recipe (all its seeds), best, random, zero, oracle, .npz
-        file, folder of them, Stable-Baselines3's model.zip (runs its code: only
-        if you trust it), or module:function; several, and repeatable. The others
-        are compared with the first, in the same trials.
+        Shipped policy, recipe (all its seeds), random, zero, oracle, .npz file,
+        folder of them, Stable-Baselines3's model.zip (runs its code: only if you
+        trust it), or module:function; several, and repeatable. The others are
+        compared with the first, in the same trials.
     problems : tuple of str
         A problem by name, or a problem file; several, and repeatable.
         ``problem`` is for a single one.

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 from kinarm.errors import InvalidInputError
 from kinarm.evaluation.contestants import BASELINES, ORACLE, UNTRAINED, Contestant
 from kinarm.evaluation.finding import check_normalizing, find_contestants
-from kinarm.policies.library import BEST, group_of, is_shipped, policy_names
+from kinarm.policies.library import group_of, is_shipped, policy_names
 from kinarm.problem import PROBLEMS, ReachProblem
 
 if TYPE_CHECKING:
@@ -21,6 +21,9 @@ if TYPE_CHECKING:
 Pair = tuple[Contestant, ReachProblem]
 """Who faces what."""
 
+SHOWN_SHIELDED = "best"
+"""Recipe whose shipped policies are shown behind a shield, too."""
+
 VARYING = ("seed", "vec_normalize")
 """Settings that differ between training seeds."""
 
@@ -28,7 +31,7 @@ VARYING = ("seed", "vec_normalize")
 def select_pairs(request: "EvaluationRequest") -> list[Pair]:
     """Decide who faces which problem; the oracle joins on every one.
 
-    Behind a shield come those that are asked to or learnt so; unasked, the recipes `BEST`, too.
+    Behind a shield come those that are asked to or learnt so; unasked, `SHOWN_SHIELDED`, too.
     """
     named = _named_problems(request)
     chosen = _named_contestants(request, named) if request.policies else _shipped(request, named)
@@ -39,7 +42,9 @@ def select_pairs(request: "EvaluationRequest") -> list[Pair]:
         for each, without in zip(chosen, bare, strict=True)
         if each not in UNTRAINED.values()
         and (
-            request.shield or each is not without or (each.recipe == BEST and not request.policies)
+            request.shield
+            or each is not without
+            or (each.recipe == SHOWN_SHIELDED and not request.policies)
         )
     ]
     chosen = [*bare, *(each for each in behind if each not in bare)]
@@ -48,8 +53,6 @@ def select_pairs(request: "EvaluationRequest") -> list[Pair]:
     for problem, contestant in product(named or _problems(request, chosen), chosen):
         if request.matrix:
             faces = True
-        elif contestant.best_for:
-            faces = problem.digest in {each.digest for each in contestant.best_for}
         else:
             faces = bool(request.policies and named) or contestant.serves(problem, changed)
         if faces:
@@ -99,22 +102,13 @@ def _named_contestants(request: "EvaluationRequest", named: list[ReachProblem]) 
     only = named[0] if len(named) == 1 else None
     found: dict[tuple[str, Path | None], Contestant] = {}
     for name in dict.fromkeys(request.policies):
-        if name != BEST:
-            chosen = find_contestants(name, only, request.vec_normalize, request.wrapper)
-            found |= {(each.name, each.source): each for each in chosen}
-            continue
-        for problem in named or [_changed(request, each) for each in PROBLEMS.values()]:
-            (best,) = find_contestants(BEST, problem, wrapper=request.wrapper)
-            before = found.get((best.name, best.source), best)
-            best_for = (*before.best_for, problem)
-            found[best.name, best.source] = replace(before, best_for=best_for)
+        chosen = find_contestants(name, only, request.vec_normalize, request.wrapper)
+        found |= {(each.name, each.source): each for each in chosen}
     return named_apart(list(found.values()))
 
 
 def is_called(contestant: Contestant, text: str) -> bool:
     """Whether a name, or a file or folder, stands for a contestant, as in `find_contestants`."""
-    if text == BEST:
-        return bool(contestant.best_for)
     path, source = Path(text).resolve(), contestant.source
     called = text in (contestant.name, group_of(contestant.name))
     return called or (source is not None and path in (source, source.parent))
@@ -122,10 +116,8 @@ def is_called(contestant: Contestant, text: str) -> bool:
 
 def _problems(request: "EvaluationRequest", chosen: list[Contestant]) -> list[ReachProblem]:
     """Problems of the contestants, or all; the paper's come first."""
-    own: dict[str, ReachProblem] = {}
-    for each in chosen:
-        trained = [_changed(request, each.problem)] if each.problem else []
-        own |= {problem.digest: problem for problem in each.best_for or trained}
+    trained = (_changed(request, each.problem) for each in chosen if each.problem)
+    own = {problem.digest: problem for problem in trained}
     changed = (_changed(request, problem) for problem in PROBLEMS.values())
     shipped = {problem.digest: problem for problem in changed}
     if request.matrix or not own:

@@ -220,10 +220,6 @@ class ReachProblem(Checked):
                 return f"{key} is {there}, not {here}"
         return None
 
-    def same_place(self, other: "ReachProblem") -> bool:
-        """Whether another problem has the same arm and scene."""
-        return self.arm_digest == other.arm_digest and self.scene == other.scene
-
     def faced_as(self, other: "ReachProblem") -> "ReachProblem":
         """The same problem, tested for contact and seen as another of the same kind of goals is."""
         alike = self.task.goal.kind == other.task.goal.kind

@@ -1,9 +1,7 @@
 """The shipped policies, and loading by name, group or file."""
 
-import json
 import re
 from collections.abc import Iterable, Sequence
-from importlib import resources
 from pathlib import Path
 
 import numpy as np
@@ -13,13 +11,7 @@ from kinarm.errors import InvalidInputError, UnknownNameError
 from kinarm.observation_layout import ObservationLayout
 from kinarm.policies.normalizer import Normalizer
 from kinarm.policies.policy import Policy
-from kinarm.problem import ProblemLike, ReachProblem
-
-BEST = "best"
-"""Name of the best shipped policy for a problem."""
-
-LEADERBOARD = "leaderboard.json"
-"""File of what policies reach and which shipped ones are best, by docs/leaderboard.py."""
+from kinarm.problem import ReachProblem
 
 SEEN = 10_000
 """Weight of an initial policy's statistics, in observations; new ones soon outweigh it."""
@@ -40,56 +32,29 @@ def group_of(name: str) -> str:
     return re.sub(r"-seed\d+$", "", name)
 
 
-def best_policy(problem: ProblemLike | None) -> str:
-    """Name of the best shipped policy for a problem.
-
-    It was chosen by what policies reach of the shipped problem, whatever tolerance, horizon, reward
-    or spread of the starts this one has.
-    """
-    if problem is None:
-        raise InvalidInputError(f"{BEST!r} is the best policy for a problem: name a --problem")
-    wanted = ReachProblem.load(problem)
-    board = resources.files("kinarm.data") / "policies" / LEADERBOARD
-    best: dict[str, str] = json.loads(board.read_text(encoding="utf-8"))["best"]
-    for trained_for, name in best.items():
-        other = ReachProblem.load(trained_for)
-        same_goals = set(other.task.goal_regions) == set(wanted.task.goal_regions)
-        if same_goals and other.same_place(wanted):
-            return name
-    raise InvalidInputError(
-        f"no shipped policy is for the arm, scene and goals of problem {wanted.name!r}: "
-        f"they are for {', '.join(best)}"
-    )
-
-
-def load_policy(name_or_file: str | Path, problem: ProblemLike | None = None) -> Policy:
+def load_policy(name_or_file: str | Path) -> Policy:
     """Load a shipped policy by name, or any policy from a file.
 
     Parameters
     ----------
     name_or_file : str or Path
-        Name of a shipped policy, or of a group for its first seed; ``"best"``;
-        or path of a file, or of a folder for the first policy in it.
-    problem : ReachProblem, str or Path, optional
-        What the best one is for.
+        Name of a shipped policy, or of a group for its first seed; or path of a
+        file, or of a folder for the first policy in it.
 
     Raises
     ------
     KinarmError
-        If it is neither name nor file, no policy ships for the problem, or the
-        file cannot be used.
+        If it is neither name nor file, or the file cannot be used.
     """
-    return Policy.load(policy_files(name_or_file, problem)[0])
+    return Policy.load(policy_files(name_or_file)[0])
 
 
-def policy_files(name_or_file: str | Path, problem: ProblemLike | None = None) -> tuple[Path, ...]:
-    """Files behind a policy's name, a group's name, ``"best"`` or a path; see `load_policy`.
+def policy_files(name_or_file: str | Path) -> tuple[Path, ...]:
+    """Files behind a policy's name, a group's name or a path; see `load_policy`.
 
     In a folder, numbers in their names order them.
     """
     text, path = str(name_or_file), Path(name_or_file)
-    if text == BEST:
-        text = best_policy(problem)
     shipped = shipped_files("policies", ".npz").items()
     files = tuple(file for name, file in shipped if text in (name, group_of(name)))
     if files:
@@ -101,7 +66,7 @@ def policy_files(name_or_file: str | Path, problem: ProblemLike | None = None) -
     if is_file(path) or path.suffix == ".npz" or path.parent != Path():
         return (path,)
     groups = dict.fromkeys(group_of(name) for name in policy_names())
-    raise UnknownNameError("policy", text, (BEST, *groups, "path/to/policy.npz", "folder/"))
+    raise UnknownNameError("policy", text, (*groups, "path/to/policy.npz", "folder/"))
 
 
 def models_in(path: Path) -> list[Path]:

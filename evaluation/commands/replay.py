@@ -48,9 +48,9 @@ class ReplayRequest(ProblemOptions):
     source : Path
         File of recordings (.npz); or a policy, as for --policy.
     policy : str
-        Shipped policy or recipe (its first seed), best, random, zero, oracle,
-        .npz file, folder of them (the first), Stable-Baselines3's model.zip
-        (runs its code: only if you trust it), or module:function.
+        Shipped policy or recipe (its first seed), random, zero, oracle, .npz
+        file, folder of them (the first), Stable-Baselines3's model.zip (runs
+        its code: only if you trust it), or module:function.
     vec_normalize : Path
         Statistics of VecNormalize for a model of Stable-Baselines3 (runs code),
         or none.
@@ -119,7 +119,6 @@ class ReplayRequest(ProblemOptions):
     DEFAULTS: ClassVar = {
         **ProblemOptions.DEFAULTS,
         "problem": "what the policy was trained for",
-        "policy": "with --failures, best",
         "trials": "5; 200 to choose from, 10000 for --failures, 20 for --play",
         "play": "without names, four that ship",
         "seed": "0",

@@ -12,7 +12,6 @@ from kinarm.evaluation.contestants import ORACLE, Contestant
 from kinarm.evaluation.finding import check_normalizing, find_contestants
 from kinarm.evaluation.outcomes import failure_causes
 from kinarm.evaluation.trials import TrialSet
-from kinarm.policies.library import BEST
 from kinarm.policies.oracle import OracleSolutions
 from kinarm.policies.provenance import package_versions, source_commit
 from kinarm.problem import ReachProblem
@@ -126,10 +125,10 @@ def chosen_recordings(request: "ReplayRequest") -> Chosen:
 def _find_candidates(request: "ReplayRequest") -> Candidates:
     """Make or read the recordings to choose from."""
     if request.source is None:
-        policy = request.policy or (BEST if request.failures else "")
-        if not (policy or request.compare):
+        names = request.compare or ((request.policy,) if request.policy else ())
+        if not names:
             raise InvalidInputError("name a --policy, or a file of recordings")
-        return _fresh_candidates(request, request.compare or (policy,))
+        return _fresh_candidates(request, names)
     found, arm = load_recordings(request.source), request.arm
     if not found:
         raise InvalidInputError(f"{str(request.source)!r} holds no recording")
@@ -155,11 +154,10 @@ def named_contestants(
 ) -> tuple[list[Contestant], ReachProblem]:
     """The contestants of names, of groups the first seeds, and the problem that they face.
 
-    The request names it (for the best policy, the usual one by default), or
-    changes that of the first trained contestant.
+    The request names it, or changes that of the first trained contestant.
     """
     named = request.problem is not None or request.task is not None
-    stated = request.resolve() if named or BEST in names else None
+    stated = request.resolve() if named else None
     contestants = [
         find_contestants(name, stated, request.vec_normalize, request.wrapper)[0] for name in names
     ]

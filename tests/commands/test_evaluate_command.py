@@ -3,16 +3,13 @@
 import json
 
 import numpy as np
-import pytest
 from documents import faced
-from refusals import check_refused
 
 from kinarm.evaluation.bounds import bounds_document
 from kinarm.evaluation.evaluation import evaluate
 from kinarm.evaluation.request import EvaluationRequest
 from kinarm.evaluation.selection import select_pairs
 from kinarm.policies import recipe, train_policy
-from kinarm.policies.library import best_policy
 from kinarm.problem import PROBLEMS
 
 
@@ -82,28 +79,8 @@ def test_changes_apply_to_what_policies_were_trained_for(policy_folder):
         assert problem.digest == PROBLEMS[problem.name].replace(tolerance=0.2).digest
 
 
-def test_the_best_of_each_problem(evaluated):
-    arguments = ("--policy", "best", "--tolerance", 0.04, "--trials", 1, "--no-oracle")
-    expected = [(best_policy(problem), problem) for problem in PROBLEMS]
-    assert faced(evaluated(*arguments)) == expected
-    some = evaluated(*arguments, "--problem", "left", "--problem", "both", "--policy", "zero")
-    assert faced(some) == [
-        (best_policy("left"), "left"),
-        ("zero", "left"),
-        (best_policy("both"), "both"),
-        ("zero", "both"),
-    ]
-    assert {entry["problem"]["task"]["tolerance"] for entry in problems_of(some)} == {0.04}
-
-
 def problems_of(document):
     return document["protocol"]["problems"].values()
-
-
-@pytest.mark.parametrize("option", [("--arm", "paper_flange"), ("--scene", "table")])
-def test_no_best_policy_for_other_arms_and_scenes(run, option):
-    arguments = ("--policy", "best", "--problem", "right", *option, "--trials", 2)
-    check_refused(run("kinarm-eval", *arguments), "no shipped policy is for", "left, right")
 
 
 def compared(document) -> list[tuple[str, str, str]]:

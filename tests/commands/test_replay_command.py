@@ -7,7 +7,6 @@ from random_policies import policy_for
 from refusals import check_refused
 
 from kinarm.evaluation.replay.playground import PLAYED
-from kinarm.policies.library import best_policy
 from kinarm.problem import ReachProblem
 from kinarm.recording import load_recordings, save_recordings
 
@@ -49,11 +48,11 @@ def test_the_worst_of_an_evaluation(replay, evaluation):
     assert played(answer) == np.argsort(-distances, kind="stable")[:3].tolist()
 
 
-@pytest.mark.parametrize(("options", "problem"), [((), "right"), (("--problem", "both"), "both")])
-def test_the_best_policy_for_a_problem(replay, options, problem):
-    answer = replay("--policy", "best", *options, "--trials", 1, *QUICK)
+@pytest.mark.parametrize(("options", "problem"), [((), "both"), (("--problem", "left"), "left")])
+def test_the_first_policy_of_a_group(replay, options, problem):
+    answer = replay("--policy", "ppo-best-both", *options, "--trials", 1, *QUICK)
     assert answer.status == 0, answer.err
-    assert f"{problem} 0, {best_policy(problem)}: " in answer.out
+    assert f"{problem} 0, ppo-best-both-seed0: " in answer.out
 
 
 def test_two_policies_on_the_same_trials(replay, tmp_path):

@@ -5,7 +5,6 @@ from collections import Counter
 from documents import outcomes_of
 from refusals import check_refused
 
-from kinarm.policies.library import best_policy
 from kinarm.recording import load_recordings
 
 
@@ -50,8 +49,3 @@ def test_failures_of_recordings(replay, recordings):
         assert f"{missed} of {len(kept)} trials of right failed" in answer.out
     else:
         check_refused(answer, "none of the 4 trials failed")
-
-
-def test_failures_are_those_of_the_best_policy_by_default(replay):
-    answer = replay("--failures", "--problem", "right", "--trials", 2000, "--no-oracle")
-    assert f"{best_policy('right')}: " in answer.out

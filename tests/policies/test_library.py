@@ -1,31 +1,20 @@
 """The shipped policies, and loading by name, group or file."""
 
-import json
-from pathlib import Path
+from importlib import resources
 
 import pytest
 
-import kinarm.data
 from kinarm._files import shipped_files
 from kinarm.errors import InvalidInputError, UnknownNameError
-from kinarm.policies import library
 from kinarm.policies.library import (
-    best_policy,
     group_of,
     load_policy,
     policy_files,
     policy_names,
 )
-from kinarm.problem import PROBLEMS, ReachProblem
-from kinarm.problem_options import ProblemOptions
+from kinarm.problem import ReachProblem
 
 NAMES = ("ars-paper-left-seed0", "ars-tuned-right-seed0", "ars-tuned-right-seed10", "ppo-both")
-
-OTHERS = [
-    ProblemOptions(problem="right", arm="paper_flange").resolve(),
-    ProblemOptions(problem="right", scene="table").resolve(),
-]
-"""An arm and a scene that no policy ships for; for the left bench, none is ranked."""
 
 
 @pytest.fixture
@@ -35,7 +24,7 @@ def shipped(monkeypatch, tmp_path, make_policy):
     for seed, name in enumerate(NAMES):
         make_policy(seed=seed).save(tmp_path / "policies" / f"{name}.npz")
     (tmp_path / "policies" / "notes.txt").write_text("no policy")
-    monkeypatch.setattr(library.resources, "files", lambda _: tmp_path)
+    monkeypatch.setattr(resources, "files", lambda _: tmp_path)
     shipped_files.cache_clear()
     yield tmp_path / "policies"
     monkeypatch.undo()
@@ -65,7 +54,7 @@ def test_unknown_name_lists_the_groups(shipped):
         load_policy("ars-mine")
     message = str(caught.value)
     assert "unknown policy 'ars-mine'" in message
-    assert "best, ars-paper-left, ars-tuned-right, ppo-both, path/to/policy.npz" in message
+    assert "ars-paper-left, ars-tuned-right, ppo-both, path/to/policy.npz" in message
 
 
 def test_group_is_the_name_without_the_seed():
@@ -82,36 +71,3 @@ def test_every_shipped_policy_loads_and_fits_its_arm(shipped_arms):
         assert made.problem.faced_as(shipped).first_difference(shipped) is None
         assert made.problem.arm.digest == shipped.arm_digest
         assert name == f"{made.algorithm}-{made.recipe}-{made.problem.name}-seed{made.seed}"
-
-
-@pytest.fixture
-def ranked(shipped):
-    """Some of them are ranked, on two problems."""
-    best = {"right": NAMES[2], "both": "ppo-both"}
-    (shipped / "leaderboard.json").write_text(json.dumps({"best": best}))
-    (shipped.parent / "arms").symlink_to(Path(kinarm.data.__file__).parent / "arms")
-    return shipped
-
-
-def test_the_best_policy_is_the_recorded_one(ranked, make_policy):
-    assert best_policy("right") == "ars-tuned-right-seed10"
-    assert best_policy(PROBLEMS["both"]) == "ppo-both"
-    loaded = load_policy("best", "right")
-    assert loaded.mean.tobytes() == make_policy(seed=2).mean.tobytes()
-    assert [file.stem for file in policy_files("best", "both")] == ["ppo-both"]
-
-
-def test_tolerance_horizon_reward_and_starts_do_not_change_the_best(ranked):
-    changed = PROBLEMS["right"].replace(tolerance=0.01, horizon=100, start_spread=0.5, name="mine")
-    assert best_policy(changed) == "ars-tuned-right-seed10"
-
-
-@pytest.mark.parametrize("problem", [*OTHERS, "left"])
-def test_other_arms_and_scenes_have_no_best_policy(ranked, problem):
-    with pytest.raises(InvalidInputError, match="no shipped policy is for .*: they are for right"):
-        best_policy(problem)
-
-
-def test_the_best_is_for_a_problem(ranked):
-    with pytest.raises(InvalidInputError, match="'best' is the best policy for a problem: name a"):
-        load_policy("best")
