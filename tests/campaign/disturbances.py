@@ -48,7 +48,7 @@ EVALUATED = (
 )
 REPLAYED = "kinarm-replay --policy ars-tuned-both-seed0 --trials 3 --out r.html --record r.npz"
 CHECKED = "kinarm-problem check right --trials 20"
-SHOWN = "kinarm-arms show paper --out arm.html"
+SHOWN = "kinarm-arms show paper"
 SHORT = TRAIN.replace("1500", "3")
 
 
@@ -224,7 +224,7 @@ Disturb = Callable[[str, int, int, Tally], None]
 WAYS: dict[Disturb, tuple[str, ...]] = {
     kill: (TRAIN, STUDIED),
     interrupt: (TRAIN, STUDIED, EVALUATED, REPLAYED, CHECKED, SHOWN),
-    limit: (SHORT, EVALUATED, REPLAYED, SHOWN),
+    limit: (SHORT, EVALUATED, REPLAYED),
 }
 if __name__ == "__main__":
     subjects = {
