@@ -167,7 +167,7 @@ def draw_surroundings(window: Visualizer, scene: Scene) -> None:
     window["sun"].set_object(_Described(shining))
     window["sun"]["<object>"].set_property("position", list(SUN_PLACE))
     if scene.ground:
-        put(window["floor"], FLOOR, cylinder(0.002, FLOOR_RADIUS, 0.0).moved((0, 0, -0.002)))
+        put(window["floor"], FLOOR, cylinder(0.002, FLOOR_RADIUS).moved((0, 0, -0.002)))
         lines = geometry.PointsGeometry(grid_lines().T)
         _show(window["grid"], geometry.LineSegments(lines, geometry.LineBasicMaterial(GRID_COLOUR)))
     _draw_obstacles(window["obstacles"], scene)
