@@ -4,11 +4,9 @@ import sys
 from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import partial
-from pathlib import Path
 from typing import cast
 
 from kinarm._command_line import Commands, run_commands
-from kinarm._files import check_output
 from kinarm._tables import print_table
 from kinarm.arm_specification import PACKAGE, ArmFile, arm_names
 
@@ -47,7 +45,7 @@ class ListRequest:
 
 @dataclass(frozen=True, kw_only=True)
 class ShowRequest:
-    """Describe an arm, and write a page on which you move its joints.
+    """Describe an arm.
 
     Parameters
     ----------
@@ -57,10 +55,6 @@ class ShowRequest:
         Link whose origin is the tool point.
     package_dirs : tuple of str
         Folder of packages that package:// meshes of a URDF are in; repeatable.
-    out : Path
-        The page to write (.html).
-    overwrite : bool
-        Replace an earlier page.
     """
 
     arm: str = field(metadata={"flag": "arm", "metavar": "ARM", "names": arm_names})
@@ -68,8 +62,6 @@ class ShowRequest:
     package_dirs: tuple[str, ...] = field(
         default=(), metadata={"flag": "--package-dir", "metavar": "FOLDER", "repeat": True}
     )
-    out: Path | None = field(default=None, metadata={"metavar": "FILE.html"})
-    overwrite: bool = False
 
 
 def _list(request: ListRequest) -> None:
@@ -84,15 +76,8 @@ def _show(request: ShowRequest) -> None:
     from kinarm.arm import Arm
     from kinarm.evaluation.arm_facts import arm_facts
 
-    if request.out is not None:
-        check_output(request.out, overwrite=request.overwrite, suffix=".html")
     arm = Arm.load(request.arm, tool_frame=request.tool_frame, package_dirs=request.package_dirs)
     print(arm_facts(arm))
-    if request.out is not None:
-        from kinarm.viewer import arm_page
-
-        page = arm_page(arm, request.out)
-        print(f"written: {request.out}, {len(page.html) / 1e6:.1f} MB, opens in any browser")
 
 
 COMMANDS: Commands = {"list": (ListRequest, _list), "show": (ShowRequest, _show)}

@@ -3,11 +3,11 @@
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, BinaryIO, ClassVar, cast
+from typing import TYPE_CHECKING, ClassVar
 
 from kinarm._command_line import Commands, run_commands
 from kinarm._console import open_console
-from kinarm._files import check_output, write_atomically
+from kinarm._files import check_output
 from kinarm._tables import print_table
 from kinarm.arm_specification import ArmSpecification, arm_names
 from kinarm.bodies import Point
@@ -23,8 +23,6 @@ if TYPE_CHECKING:
 HEADINGS = ("problem", "arm", "obstacles", "goals", "step [s]", "tolerance [m]")
 EXPENDABLE = ("obstacles", "step [s]", "tolerance [m]")
 """Columns that narrow terminals leave out, in this order."""
-
-PICTURE_SIZE = 960, 640
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -60,34 +58,20 @@ class CheckRequest(ShowRequest):
         Trials that the oracle faces.
     seed : int
         Seed of the trials.
-    picture : Path
-        Picture of arm and scene (.png), which needs the extra render.
-    overwrite : bool
-        Replace an earlier picture.
     """
 
     trials: int = field(default=200, metadata=TRIALS)
     seed: int = field(default=0, metadata=FROM_ZERO)
-    picture: Path | None = field(default=None, metadata={"metavar": "FILE.png"})
-    overwrite: bool = False
 
-    GROUPS: ClassVar = {
-        "what is checked": "trials seed",
-        "output": "picture overwrite",
-        **ProblemOptions.GROUPS,
-    }
+    GROUPS: ClassVar = {"what is checked": "trials seed", **ProblemOptions.GROUPS}
 
     def run(self) -> "ProblemCheck":
-        """Check the problem, and write the picture."""
+        """Check the problem."""
         from kinarm.evaluation.problem_check import check_problem
         from kinarm.world import World
 
         problem = self.resolve()
-        if self.picture is not None:
-            check_output(self.picture, overwrite=self.overwrite, suffix=".png")
         say_choices([problem])
-        if self.picture is not None:
-            write_picture(self.picture, problem)
         with open_console(stderr=True).status("checking") as status:
             return check_problem(
                 World(problem),
@@ -128,19 +112,6 @@ class ImportRequest:
     overwrite: bool = False
 
 
-def write_picture(path: Path, problem: ReachProblem) -> None:
-    """Write a picture of the arm at home, with a goal in mid-region."""
-    from matplotlib.image import imsave
-
-    from kinarm.viewer import Renderer
-
-    region = problem.scene.goal_region(problem.task.goal_regions[0])
-    goal = [(low + high) / 2 for low, high in zip(region.lower, region.upper, strict=True)]
-    width, height = PICTURE_SIZE
-    taken = Renderer(problem, width=width, height=height).render(problem.load_arm().home, goal)
-    write_atomically(path, lambda file: imsave(cast("BinaryIO", file), taken, format="png"))
-
-
 def rows() -> list[tuple[str, ...]]:
     """A row for each shipped problem, under `HEADINGS`."""
     return [
@@ -161,8 +132,6 @@ def _check(request: CheckRequest) -> None:
     goals = " and ".join(problem.task.goal_regions)
     print(f"{problem.name}: arm {problem.arm.name}, goals {goals}")
     print(check)
-    if request.picture is not None:
-        print(f"  written  {request.picture}")
 
 
 def _import(request: ImportRequest) -> None:

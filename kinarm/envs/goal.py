@@ -1,7 +1,7 @@
 """The goal-conditioned environments, for hindsight replay."""
 
 from collections.abc import Mapping
-from typing import Any, Literal, get_args
+from typing import Any
 
 import numpy as np
 from gymnasium.spaces import Dict, Space
@@ -24,14 +24,11 @@ from kinarm.goals import REST_PARTS
 from kinarm.kernels.goals import errors_between
 from kinarm.simulator import Simulator, StepResult
 
-RewardType = Literal["sparse", "dense"]
-
 
 class GoalRewards:
     """Rewards and ends that follow from goals."""
 
     simulator: Simulator
-    reward_type: RewardType
 
     def compute_reward(
         self, achieved_goal: ArrayLike, desired_goal: ArrayLike, info: object
@@ -49,12 +46,9 @@ class GoalRewards:
         -------
         float or ndarray, shape (...)
         """
-        task, (distance, turn) = self.simulator.task, self._errors(achieved_goal, desired_goal)
-        if self.reward_type == "sparse":
-            reached = np.where(self._within(distance, turn), 0.0, -1.0)
-        else:
-            reached = -(distance + task.reward.rotation * turn)
-        return (reached + task.reward.collision * _collided(info))[()]
+        reached = self.compute_terminated(achieved_goal, desired_goal, info)
+        penalty = self.simulator.task.reward.collision
+        return (np.where(reached, 0.0, -1.0) + penalty * _collided(info))[()]
 
     def compute_terminated(
         self,
@@ -69,7 +63,8 @@ class GoalRewards:
         achieved_goal, desired_goal, info
             As for `compute_reward`; infos have no effect.
         """
-        return self._within(*self._errors(achieved_goal, desired_goal))
+        task, (distance, turn) = self.simulator.task, self._errors(achieved_goal, desired_goal)
+        return (distance <= task.tolerance) & (turn <= task.goal.rotation_tolerance)
 
     def compute_truncated(
         self, achieved_goal: ArrayLike, desired_goal: ArrayLike, info: object
@@ -82,11 +77,6 @@ class GoalRewards:
             As for `compute_reward`, without effect.
         """
         return self.compute_terminated(achieved_goal, desired_goal, info) & False
-
-    def _within(self, distance: NDArray[np.float64], turn: NDArray[np.float64]) -> Any:
-        """Whether errors are within the tolerances."""
-        task = self.simulator.task
-        return (distance <= task.tolerance) & (turn <= task.goal.rotation_tolerance)
 
     def _errors(self, achieved: ArrayLike, desired: ArrayLike) -> tuple[Any, Any]:
         """Distances [m] and turns [rad, or rad or m] of achieved goals from desired ones."""
@@ -112,17 +102,7 @@ class GoalInterface(GoalRewards, Interface):
 
     tells_terms = False
 
-    def __init__(
-        self,
-        simulator: Simulator,
-        dtype: DTypeLike = np.float64,
-        reward_type: RewardType = "sparse",
-    ) -> None:
-        if reward_type not in get_args(RewardType):
-            raise InvalidInputError(
-                f"reward_type must be one of {list(get_args(RewardType))}, got {reward_type!r}"
-            )
-        self.reward_type = reward_type
+    def __init__(self, simulator: Simulator, dtype: DTypeLike = np.float64) -> None:
         layout, goal = simulator.world.layout, simulator.task.goal
         (self._goal, self._offset), self._own = layout.goal_entries, layout.entries(of_goal=False)
         if goal.hold > 1 or goal.speed is not None or goal.changes:
@@ -172,14 +152,8 @@ class GoalInterface(GoalRewards, Interface):
 class GoalEnvironment(GoalRewards, ArmEnvironment):
     """An environment with a `GoalInterface`."""
 
-    def __init__(
-        self, *arguments: Any, reward_type: RewardType = "sparse", **settings: Any
-    ) -> None:
-        self.reward_type = reward_type
-        super().__init__(*arguments, **settings)
-
     def _make_interface(self, simulator: Simulator, dtype: DTypeLike) -> GoalInterface:
-        return GoalInterface(simulator, dtype, self.reward_type)
+        return GoalInterface(simulator, dtype)
 
 
 class ReachGoalEnv(GoalEnvironment, ReachEnv):
@@ -189,12 +163,9 @@ class ReachGoalEnv(GoalEnvironment, ReachEnv):
     ----------
     problem : ReachProblem, str or Path
         As for `ReachEnv`.
-    reward_type : {"sparse", "dense"}
-        -1 for each step but 0 for one that reaches the goal, or minus the
-        distance [m].
     **settings
-        As for `ReachEnv`; only ``collision`` and ``rotation`` of the problem's
-        own reward have an effect.
+        As for `ReachEnv`; only ``collision`` of the problem's own reward has an
+        effect.
 
     Notes
     -----
@@ -203,11 +174,11 @@ class ReachGoalEnv(GoalEnvironment, ReachEnv):
     arms of six joints); ``achieved_goal``, the tool point x, y, z [m]; ``desired_goal``, the goal
     x, y, z [m]. Goals with a direction, a rotation or joints have these behind.
 
-    **Reward**: that of the reward type, and the problem's ``collision`` (-1 by
-    default) if a move was refused. ``compute_reward(achieved_goal,
-    desired_goal, info)`` returns it for one or many pairs of goals, from these
-    and ``info["collision"]`` only; ``compute_terminated`` and
-    ``compute_truncated`` depend on the goals.
+    **Reward**: -1 for each step but 0 for one that reaches the goal, and the
+    problem's ``collision`` (-1 by default) if a move was refused.
+    ``compute_reward(achieved_goal, desired_goal, info)`` returns it for one or
+    many pairs of goals, from these and ``info["collision"]`` only;
+    ``compute_terminated`` and ``compute_truncated`` depend on the goals.
 
     **End**: terminated when the tool is within the tolerance of the goal;
     truncated at the horizon. A move that would touch something is refused, the
@@ -229,8 +200,6 @@ class ReachGoalVectorEnv(GoalEnvironment, ReachVectorEnv):
     ----------
     num_envs, problem, **settings
         As for `ReachVectorEnv`.
-    reward_type : {"sparse", "dense"}
-        As for `ReachGoalEnv`.
     """
 
 

@@ -44,7 +44,6 @@ OBSTACLE = Finish(0xB4BCC6, roughness=0.8)
 GOAL_SLAB = Finish(0xCBD2DA, roughness=0.7)
 HALO = Finish(0x009E73, opacity=0.16, glow=True)
 FLASH = Finish(OUTCOME_COLOURS["collision"], opacity=0.5, glow=True)
-SHAPE = Finish(0x56B4E9, roughness=0.6, opacity=0.34)
 GRID_COLOUR = 0xC6CCD3
 BACKGROUND = [0.93, 0.945, 0.96]
 
@@ -135,8 +134,8 @@ def _show(window: Visualizer, shown: geometry.Object) -> None:
     window.set_object(shown)
 
 
-def draw_stage(window: Visualizer, arm: Arm, scene: Scene) -> list[Visualizer]:
-    """Draw surroundings, the ball at a contact, and an arm; return the arm's frames.
+def draw_stage(window: Visualizer, arm: Arm, scene: Scene) -> None:
+    """Draw surroundings, the ball at a contact, and an arm.
 
     Parameters
     ----------
@@ -147,7 +146,7 @@ def draw_stage(window: Visualizer, arm: Arm, scene: Scene) -> list[Visualizer]:
     """
     draw_surroundings(window, scene)
     put(window["flash"], FLASH, capsule(0.0, stage_scale(arm, scene) * FLASH_RADIUS))
-    return draw_arm(window["arm"], arm)
+    draw_arm(window["arm"], arm)
 
 
 def draw_surroundings(window: Visualizer, scene: Scene) -> None:
@@ -168,7 +167,7 @@ def draw_surroundings(window: Visualizer, scene: Scene) -> None:
     window["sun"].set_object(_Described(shining))
     window["sun"]["<object>"].set_property("position", list(SUN_PLACE))
     if scene.ground:
-        put(window["floor"], FLOOR, cylinder(0.002, FLOOR_RADIUS, 0.0).moved((0, 0, -0.002)))
+        put(window["floor"], FLOOR, cylinder(0.002, FLOOR_RADIUS).moved((0, 0, -0.002)))
         lines = geometry.PointsGeometry(grid_lines().T)
         _show(window["grid"], geometry.LineSegments(lines, geometry.LineBasicMaterial(GRID_COLOUR)))
     _draw_obstacles(window["obstacles"], scene)

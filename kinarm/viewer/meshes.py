@@ -108,46 +108,19 @@ def loft(rings: Array) -> Mesh:
     return Mesh(np.concatenate([rings.reshape(-1, 3), middles]), np.concatenate([walls, *ends]))
 
 
-def lathe(profile: Sequence[tuple[float, float]], axis: str = "z") -> Mesh:
-    """Turn a profile of positions and radii [m] about an axis."""
+def lathe(profile: Sequence[tuple[float, float]]) -> Mesh:
+    """Turn a profile of positions and radii [m] about z."""
     angle = np.linspace(0, 2 * np.pi, SEGMENTS, endpoint=False)
     position, radius = np.array(profile, dtype=float).T
     across = radius[:, None] * np.cos(angle), radius[:, None] * np.sin(angle)
     along = np.repeat(position[:, None], SEGMENTS, axis=1)
-    order = {"z": (*across, along), "x": (along, *across), "y": (across[1], along, across[0])}
-    return loft(np.stack(order[axis], axis=2))
+    return loft(np.stack((*across, along), axis=2))
 
 
-def cylinder(length: float, radius: float, chamfer: float, axis: str = "z") -> Mesh:
-    """A cylinder about the origin with chamfered rims [m].
-
-    Parameters
-    ----------
-    length, radius, chamfer, axis
-        Its sizes [m], and its direction: ``"x"``, ``"y"`` or ``"z"``.
-    """
+def cylinder(length: float, radius: float) -> Mesh:
+    """A cylinder along z, about the origin [m]."""
     half = length / 2
-    profile = [(-half, radius - chamfer), (-half + chamfer, radius)]
-    return lathe([*profile, (half - chamfer, radius), (half, radius - chamfer)], axis)
-
-
-def housing(sections: Sequence[tuple[float, float, float, float, float]]) -> Mesh:
-    """Blend rounded cross sections that are stacked along z.
-
-    Each has height, centre and half widths [m], and an exponent: 2 is an ellipse, more is boxier.
-    """
-    angle = np.linspace(0, 2 * np.pi, SEGMENTS, endpoint=False)
-    z, x, half_x, half_y, exponent = np.array(sections, dtype=float).T[..., None]
-    cosine, sine = (
-        np.sign(f) * np.abs(f) ** (2 / exponent) for f in (np.cos(angle), np.sin(angle))
-    )
-    return loft(np.stack([x + half_x * cosine, half_y * sine, z + 0 * angle], axis=2))
-
-
-def plate(outline: Sequence[ArrayLike], levels: Sequence[tuple[float, float]]) -> Mesh:
-    """Stack an outline of points x, z along y, by levels y and scales [m, 1]."""
-    flat = np.array(outline, dtype=float)
-    return loft(np.array([np.insert(scale * flat, 1, y, axis=1) for y, scale in levels]))
+    return lathe([(-half, radius), (half, radius)])
 
 
 def box(size: ArrayLike, chamfer: float = 0.0) -> Mesh:
@@ -208,5 +181,5 @@ def from_coal(shape: coal.CollisionGeometry) -> Mesh:
     if isinstance(shape, coal.Capsule):
         return capsule(2 * shape.halfLength, shape.radius)
     if isinstance(shape, coal.Cylinder):
-        return cylinder(2 * shape.halfLength, shape.radius, 0.0)
+        return cylinder(2 * shape.halfLength, shape.radius)
     return _convex_hull(np.array(shape.points()))

@@ -53,7 +53,6 @@ const BADGES = {
   success: ["Reached", "m5 12.5 4.5 4.5L19 7.5"],
   collision: ["Contact", "M6 6l12 12M18 6 6 18"],
   truncated: ["Truncated", "M12 6v6.5l4 2.5M12 3a9 9 0 1 0 .01 0"],
-  free: ["Free", "m5 12.5 4.5 4.5L19 7.5"],
   moving: ["Moving", "M5 12h14M13 6l6 6-6 6"],
 };
 

@@ -1,4 +1,4 @@
-"""Pages of recordings and arms: HTML that needs WebGL, but no network."""
+"""Pages of recordings: HTML that needs WebGL, but no network."""
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
@@ -11,7 +11,6 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from kinarm.arm import Arm
-from kinarm.arm_specification import ArmSpecification
 from kinarm.body_motion import BodyMotion
 from kinarm.collision import ContactModel
 from kinarm.enclosures import core
@@ -21,25 +20,18 @@ from kinarm.recording import Recording
 from kinarm.scene import Scene
 from kinarm.viewer.camera import stage_scale
 from kinarm.viewer.drawing import (
-    SHAPE,
     DrawnScene,
     draw_goal,
     draw_random_bodies,
     draw_stage,
     draw_trace,
-    put,
 )
 from kinarm.viewer.html_page import HtmlPage, page_html
 from kinarm.viewer.parts import PAGE_COLOURS, TRACE_SIDES, goal_pose
-from kinarm.viewer.visual_shapes import arm_parts, collision_parts, link_joints
-
-NEARER = 0.8
-"""Camera's distance from an arm alone, as a share of that in replays."""
+from kinarm.viewer.visual_shapes import arm_parts, link_joints
 
 RUN_FIELDS = ("policy", "outcome", "contact", "replaced")
 """What scripts know of a recording as it is."""
-
-BARE_GROUND = Scene(obstacles=(), goal_regions=())
 
 
 def arm_data(arm: Arm, scene: Scene) -> dict[str, Any]:
@@ -205,46 +197,3 @@ def _placed(problem: ReachProblem, goal: NDArray[np.float64]) -> list[float]:
     """Position of a goal [m], and quaternion x y z w of its marks."""
     pose = goal_pose(problem.task.goal, goal)
     return [*pose[:3, 3].tolist(), *pin.Quaternion(pose[:3, :3]).coeffs().tolist()]
-
-
-def arm_page(
-    arm: Arm | ArmSpecification | str | Path,
-    path: str | Path | None = None,
-    *,
-    scene: Scene = BARE_GROUND,
-) -> HtmlPage:
-    """Make a page with a slider for each joint of an arm, which shows contact.
-
-    In the browser, the page tests the same pairs of shapes as the simulator.
-    Its verdicts are Coal's, except for shapes that are less than 1e-6 m from
-    touching.
-
-    Parameters
-    ----------
-    arm : Arm, ArmSpecification, str or Path
-        The arm where it stands, or for `kinarm.Arm.load`, mounted as in the
-        scene.
-    path : str or Path, optional
-        File of the page, if it is to be written.
-    scene : Scene
-        The scene around the arm; the bare ground by default.
-    """
-    if not isinstance(arm, Arm):
-        arm = Arm.load(arm).placed(scene.mount.position, scene.mount.rotation)
-    model, drawn = ContactModel.build(arm, scene), DrawnScene()
-    frames = draw_stage(drawn.window, arm, scene)
-    for number, part in enumerate(collision_parts(arm)):
-        put(frames[part.joint][f"shape_{number}"], SHAPE, part.mesh)
-    data = arm_data(arm, scene) | {
-        "joints": list(arm.joint_names),
-        **{name: getattr(arm, name).tolist() for name in ("lower", "upper", "home")},
-        "reach": arm.reach,
-        **contact_data(model),
-    }
-    data["scale"] *= NEARER
-    title = f"{arm.name} · kinarm arm"
-    scripts = ("kinematics", "contact", "arm_page")
-    page = HtmlPage(page_html("arm_page", title, drawn.content, data, scripts))
-    if path is not None:
-        page.save(path)
-    return page

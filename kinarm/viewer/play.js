@@ -259,6 +259,7 @@ start((viewer, data) => {
   window.kinarm = {
     rollout: (request) => playground.simulator.rollout(request),
     solution: (start, goal) => nearestSolution(playground.simulator, { q: start, goal }),
+    contacts: (configuration) => playground.simulator.contact.at(configuration),
     setGoal: (goal) => playground.setGoal(goal),
     moveObstacle: (number, offset) => { playground.moveObstacle(number, offset); playground.restart(); },
     step: () => { playground.step(); playground.share = 1; playground.show(); },

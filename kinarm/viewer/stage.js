@@ -6,7 +6,6 @@ const THEMES = {
 };
 const TOUCHED = 0x8c2f00;
 const BEHIND = { polygonOffset: true, polygonOffsetFactor: 1, polygonOffsetUnits: 8 }; // gives way to what coincides
-const IN_FRONT = { polygonOffset: true, polygonOffsetFactor: -1, polygonOffsetUnits: -4 };
 
 /* ---------- the arm: joint values to poses ---------- */
 

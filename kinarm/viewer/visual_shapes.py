@@ -1,4 +1,4 @@
-"""The looks of an arm: an industrial one if its dimensions fit, else its own shapes.
+"""The looks of an arm: triangles that ship with it, else the shapes of its URDF.
 
 Meshes are painted, simplified triangles; a file is read once, then cached.
 """
@@ -17,23 +17,16 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike, NDArray
 
-from kinarm._fields import read_toml
-from kinarm._files import cached_arrays, first_line
+from kinarm._files import absolute, cached_arrays, first_line, load_archive, shipped_files
 from kinarm.arm import Arm
 from kinarm.contact_pairs import body_names
 from kinarm.errors import ArmError, KinarmError, MissingExtraError
 from kinarm.meshes import mesh_content
 from kinarm.urdf_tree import FARTHEST, check_numbers, check_shapes
-from kinarm.viewer.meshes import Mesh, box, capsule, cylinder, from_coal, housing, lathe, plate
+from kinarm.viewer.meshes import Mesh, from_coal
 from kinarm.viewer.parts import FINISHES, PLAIN, ArmPart, packed_colour, shape_finish
 
 Element = ElementTree.Element
-
-SHAPES = {shape.__name__: shape for shape in (box, capsule, cylinder, housing, lathe, plate)}
-"""Shapes of parts in ``industrial_arm.toml``."""
-
-AXES = np.array([(0, 0, 1), (0, 1, 0), (0, -1, 0), (-1, 0, 0), (0, -1, 0), (-1, 0, 0)])
-"""Axes of the joints of an arm that looks like that."""
 
 TOOL_RADIUS = 0.012
 """Radius of the tool's ball; for a reach below 1 m, times the reach [m]."""
@@ -64,13 +57,13 @@ class PaintedMesh(NamedTuple):
 def arm_parts(arm: Arm) -> tuple[ArmPart, ...]:
     """All parts of an arm, and what it holds.
 
-    It looks industrial with the geometry of the shipped ones. Any other arm shows the visual shapes
-    of its URDF, or its collision shapes where none can be read, which is logged.
+    The project's own arms have looks that ship with them. Any other arm shows the visual shapes of
+    its URDF, or its collision shapes where none can be read, which is logged.
     """
     n_held = len(arm.held_bodies)
     held = collision_parts(arm)[-n_held:] if n_held else ()
-    if looks_industrial(arm):
-        return (*industrial_parts(arm), *held)
+    if stored := tuple(stored_parts(arm)):
+        return (*stored, *held)
     try:
         found = tuple(visual_parts(arm))
     except KinarmError as error:
@@ -83,47 +76,19 @@ def arm_parts(arm: Arm) -> tuple[ArmPart, ...]:
     return (*parts, ArmPart(arm.n_joints, FINISHES["accent"], tool))
 
 
-def looks_industrial(arm: Arm) -> bool:
-    """Whether an arm has the axes and offsets of ``industrial_arm.toml``."""
-    chain = arm.chain
-    if chain.n_joints != 6 or chain.prismatic.any() or not np.allclose(chain.axis, AXES):
-        return False
-    upper, forearm = chain.translation[2][2], chain.translation[3][0]
-    first = arm.model.frames[1].placement * pin.SE3(np.eye(3), np.array([0, 0, 0.33]))
-    expected = [(0.075, 0, 0), (0, 0, upper), (forearm, 0, 0.075), (0, 0, 0), (0.08, 0, 0)]
-    return (
-        arm.model.jointPlacements[1].isApprox(first, 1e-6)
-        and np.allclose(chain.translation[1:], expected)
-        and np.allclose(chain.rotation[1:], [1, 0, 0, 0])
-        and np.allclose(chain.tool[1:], 0)
-        and 0.2 <= upper <= 0.6
-        and 0.25 <= forearm <= 0.6
-        and (chain.tool[0] == 0 or chain.tool[0] >= 0.08)
-    )
-
-
-def industrial_parts(arm: Arm) -> Iterator[ArmPart]:
-    """Parts of ``industrial_arm.toml``, in the lengths of an arm."""
-    chain, base = arm.chain, arm.model.frames[1].placement  # of the link fixed in the world
-    lengths = {"upper": chain.translation[2][2], "forearm": chain.translation[3][0]}
-    lengths |= {"tool": chain.tool[0], "m": 1.0}
-
-    def measured(value: Any) -> Any:
-        """Sum up lengths wherever they occur in the sizes of a part."""
-        if isinstance(value, dict):
-            return sum(share * lengths[name] for name, share in value.items())
-        return [measured(each) for each in value] if isinstance(value, list) else value
-
-    for part in read_toml(Path(__file__).with_name("industrial_arm.toml"), "looks")["part"]:
-        if not lengths[part.get("with", "m")]:
-            continue
-        sizes = {name: measured(size) for name, size in part["sizes"].items()}
-        mesh = SHAPES[part["shape"]](**sizes)
-        for place in part.get("places", [(0.0, 0.0, 0.0)]):
-            there = mesh.moved(measured(place))
-            if part["joint"] == 0:
-                there = there.moved(base.translation, base.rotation)
-            yield ArmPart(part["joint"], FINISHES[part["finish"]], there)
+def stored_parts(arm: Arm) -> Iterator[ArmPart]:
+    """Parts that ship beside the URDF of an arm, if it has their joints and tool."""
+    looks = arm.description.path.with_suffix(".npz")
+    if looks not in map(absolute, shipped_files("arms", ".npz").values()):
+        return
+    header, arrays = load_archive(looks, "looks", 1, ArmError)
+    if [*arm.joint_names] != header["names"] or not np.allclose(arm.chain.tool, header["tool"]):
+        return
+    base = arm.model.frames[1].placement  # of the link fixed in the world
+    for number, joint in enumerate(arrays["joints"].tolist()):
+        mesh = Mesh(arrays[f"vertices {number}"], arrays[f"faces {number}"])
+        placed = mesh if joint else mesh.moved(base.translation, base.rotation)
+        yield ArmPart(joint, FINISHES[arrays["finishes"][number]], placed)
 
 
 def collision_parts(arm: Arm) -> tuple[ArmPart, ...]:

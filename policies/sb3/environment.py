@@ -22,7 +22,7 @@ def sb3_vec_env(
     *,
     seed: int | None = None,
     observation_dtype: DTypeLike = "float32",
-    reward_type: str | None = None,
+    goal_conditioned: bool = False,
     threads: int | None = None,
     render_mode: str | None = None,
     width: int = 480,
@@ -42,9 +42,10 @@ def sb3_vec_env(
         ``"kinarm/ReachGoalRight-v0"``.
     n_envs, seed : int
         Number of arms, and seed, which a learner's own ``seed`` replaces.
-    observation_dtype, reward_type : str, optional
-        As for `kinarm.ReachGoalEnv`; a reward type makes any problem
-        goal-conditioned.
+    observation_dtype : dtype
+        As for `kinarm.ReachEnv`.
+    goal_conditioned : bool
+        Whether arms are those of `kinarm.ReachGoalEnv`, in any problem.
     threads : int, optional
         As for `kinarm.Simulator`.
     render_mode, width, height, camera
@@ -70,25 +71,25 @@ def sb3_vec_env(
         "camera": camera,
         **overrides,
     }
-    if reward_type is not None:
-        settings["reward_type"] = reward_type
-    env = SB3VecEnv(_batch(problem, n_envs, settings))
+    env = SB3VecEnv(_batch(problem, n_envs, goal_conditioned, settings))
     env.seed(None if seed is None else whole_number("seed", seed, 0))
     return env
 
 
-def _batch(problem: ProblemLike, n_envs: int, settings: dict[str, Any]) -> "ReachVectorEnv":
+def _batch(
+    problem: ProblemLike, n_envs: int, goal_conditioned: bool, settings: dict[str, Any]
+) -> "ReachVectorEnv":
     """The batch of a problem or of an environment's id."""
     from kinarm.envs import ReachGoalVectorEnv, ReachVectorEnv
 
+    kind = ReachGoalVectorEnv if goal_conditioned else ReachVectorEnv
     name = str(problem).rpartition(":")[2]
     if name in gymnasium.registry:
         entry_point = gymnasium.spec(name).vector_entry_point
         maker = load_env_creator(entry_point) if isinstance(entry_point, str) else entry_point
-        if isinstance(maker, type) and issubclass(maker, ReachVectorEnv):
+        if isinstance(maker, type) and issubclass(maker, kind):
             made = gymnasium.make_vec(name, n_envs, "vector_entry_point", **settings)
             return cast("ReachVectorEnv", made.unwrapped)
     elif not name.startswith("kinarm/") or name.endswith(".toml"):
-        kind = ReachGoalVectorEnv if "reward_type" in settings else ReachVectorEnv
         return kind(n_envs, problem, **settings)
     raise UnknownNameError("environment", str(problem), ENVIRONMENTS)

@@ -165,8 +165,8 @@ def trained_policy(config: SB3Config, state: SB3State) -> Policy:
 def sb3_model(config: SB3Config) -> BaseAlgorithm:
     """Build the algorithm, with its environment."""
     problem = config.training_problem.replace(tolerance=config.training_tolerance)
-    kind = "sparse" if config.hindsight else None
-    env: VecEnv = sb3_vec_env(problem, config.n_envs, reward_type=kind, threads=1)
+    goals = config.hindsight
+    env: VecEnv = sb3_vec_env(problem, config.n_envs, goal_conditioned=goals, threads=1)
     if config.normalize:
         env = VecNormalize(env, norm_reward=False)
     given: dict[str, Any] = {

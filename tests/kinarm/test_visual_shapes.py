@@ -1,11 +1,13 @@
 """What robots look like, of shapes that their descriptions name."""
 
+import shutil
+
 import numpy as np
 import pytest
 
 from kinarm.arm import Arm
 from kinarm.errors import ArmError
-from kinarm.viewer.visual_shapes import visual_parts
+from kinarm.viewer.visual_shapes import arm_parts, visual_parts
 
 
 def seen(write_robot, make_joint, visual):
@@ -29,6 +31,19 @@ def test_shapes_have_their_sizes_and_places(write_robot, make_joint, shape, exte
     vertices = part.mesh.vertices
     np.testing.assert_allclose(np.ptp(vertices, axis=0), extents, atol=2e-3)
     np.testing.assert_allclose(vertices.max(axis=0) + vertices.min(axis=0), (0, 0, 2), atol=2e-3)
+
+
+@pytest.mark.parametrize("name", ["paper", "paper_flange", "lrmate200ic_5l"])
+def test_looks_ship_with_the_projects_own_arms(name, tmp_path):
+    """With their joints and tool. What lies beside another URDF is not read."""
+    arm = Arm.load(name)
+    assert len(arm_parts(arm)) >= 50
+    for changes in ({"held": {"axis_4": 0.3}}, {"tool_offset": (0.0, 0.0, 0.1)}):
+        assert len(arm_parts(Arm.load(name, **changes))) < 50
+    copied = tmp_path / "copied.urdf"
+    shutil.copy(arm.description.path, copied)
+    copied.with_suffix(".npz").touch()
+    assert len(arm_parts(Arm.load(copied))) < 50
 
 
 @pytest.mark.parametrize(

@@ -6,7 +6,6 @@ import pytest
 
 from kinarm.envs.goal import ReachGoalEnv, ReachGoalVectorEnv
 from kinarm.envs.reach import ReachEnv
-from kinarm.errors import InvalidInputError
 
 NAMES = [f"kinarm/ReachGoal{task}-v0" for task in ("Left", "Right", "Both")]
 HOME = np.zeros(6)
@@ -25,9 +24,8 @@ def episodes(env, steps=300, seed=0):
 
 
 @pytest.mark.parametrize("name", NAMES)
-@pytest.mark.parametrize("reward_type", ["sparse", "dense"])
-def test_reward_and_endings_follow_from_the_goals(name, reward_type):
-    env = gymnasium.make(name, reward_type=reward_type, tolerance=0.6).unwrapped
+def test_reward_and_endings_follow_from_the_goals(name):
+    env = gymnasium.make(name, tolerance=0.6).unwrapped
     ends = 0
     for observation, reward, terminated, _, info in episodes(env, 1500):
         goals = observation["achieved_goal"], observation["desired_goal"], info
@@ -38,15 +36,13 @@ def test_reward_and_endings_follow_from_the_goals(name, reward_type):
     assert ends > 3
 
 
-@pytest.mark.parametrize("reward_type", ["sparse", "dense"])
-def test_rewards_of_many_goals_at_once(reward_type):
-    env = ReachGoalEnv(reward_type=reward_type)
+def test_rewards_of_many_goals_at_once():
+    env = ReachGoalEnv()
     rng = np.random.default_rng(1)
     achieved, desired = rng.uniform(-0.1, 0.1, (2, 500, 3))
     rewards = env.compute_reward(achieved, desired, [{}] * 500)
     distances = np.linalg.norm(achieved - desired, axis=1)
-    expected = -distances if reward_type == "dense" else -(distances > 0.05).astype(float)
-    np.testing.assert_allclose(rewards, expected, rtol=1e-12)
+    np.testing.assert_array_equal(rewards, -(distances > 0.05).astype(float))
     assert [env.compute_reward(a, d, {}) for a, d in zip(achieved, desired, strict=True)] == list(
         rewards
     )
@@ -54,7 +50,7 @@ def test_rewards_of_many_goals_at_once(reward_type):
         env.compute_terminated(achieved, desired, [{}] * 500), distances <= 0.05
     )
     assert not env.compute_truncated(achieved, desired, [{}] * 500).any()
-    batch = ReachGoalVectorEnv(500, reward_type=reward_type)
+    batch = ReachGoalVectorEnv(500)
     infos = [{}, {"collision": True}] * 250
     expected = [env.compute_reward(*each) for each in zip(achieved, desired, infos, strict=True)]
     np.testing.assert_array_equal(batch.compute_reward(achieved, desired, infos), expected)
@@ -88,11 +84,8 @@ def test_contact_refuses_the_move_and_the_episode_goes_on():
     assert lifted["achieved_goal"][2] > before[2] + 0.05
 
 
-@pytest.mark.parametrize("reward_type", ["sparse", "dense"])
-def test_a_refused_move_costs_what_the_problem_says(reward_type):
-    free, dear = (
-        ReachGoalEnv(reward_type=reward_type, reward={"collision": weight}) for weight in (0, -3)
-    )
+def test_a_refused_move_costs_what_the_problem_says():
+    free, dear = (ReachGoalEnv(reward={"collision": weight}) for weight in (0, -3))
     refused = 0
     for (_, first, *_), (seen, second, _, _, info) in zip(
         episodes(free), episodes(dear), strict=True
@@ -157,8 +150,3 @@ def test_float32():
         assert env.observation_space.contains(observation)
         goals = observation["achieved_goal"], observation["desired_goal"]
         assert env.compute_reward(*goals, info) == reward
-
-
-def test_unknown_reward_type():
-    with pytest.raises(InvalidInputError, match=r"reward_type must be one of .*'dense'.*'shaped'"):
-        ReachGoalEnv(reward_type="shaped")

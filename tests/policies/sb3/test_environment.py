@@ -29,10 +29,10 @@ class TestProblems:
             assert type(env.observation_space).__name__ == space
             assert (env.num_envs, env.spec.id) == (3, env_id)
 
-    def test_a_reward_type_makes_goals(self):
-        env = sb3_vec_env("both", 2, reward_type="dense", horizon=4)
+    def test_any_problem_may_have_goals(self):
+        env = sb3_vec_env("both", 2, goal_conditioned=True, horizon=4)
         assert set(env.reset()) == {"observation", "achieved_goal", "desired_goal"}
-        assert (env.step(np.zeros((2, 5)))[1] < -0.05).all()
+        assert (env.step(np.zeros((2, 5)))[1] == -1).all()
 
 
 @pytest.mark.parametrize("n_envs", [0, -1, 1.5, True, "2", None])
@@ -47,11 +47,15 @@ def test_unknown_environment(env_id):
         sb3_vec_env(env_id)
 
 
+def test_an_environment_without_goals():
+    with pytest.raises(UnknownNameError, match="kinarm/ReachRight-v0"):
+        sb3_vec_env("kinarm/ReachRight-v0", goal_conditioned=True)
+
+
 @pytest.mark.parametrize(
     ("settings", "message"),
     [
         ({"seed": -1}, "seed must be a whole number of at least 0"),
-        ({"reward_type": "rare"}, "reward_type must be one of"),
         ({"speed": 2}, "speed"),
         ({"problem": "up"}, "unknown problem 'up'"),
     ],

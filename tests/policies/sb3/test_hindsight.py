@@ -32,7 +32,7 @@ def filled(env, steps=400):
 @pytest.fixture(scope="module")
 def samples():
     env = sb3_vec_env(
-        "right", 9, reward_type="sparse", tolerance=TOLERANCE, reward={"collision": COLLISION}
+        "right", 9, goal_conditioned=True, tolerance=TOLERANCE, reward={"collision": COLLISION}
     )
     return filled(env).replay_buffer.sample(4000)
 
@@ -60,7 +60,7 @@ def test_rewards_are_those_of_the_goals_and_of_collisions(samples):
 
 
 def test_goals_are_judged_as_they_are_and_not_as_they_are_shown():
-    arms = sb3_vec_env("right", 9, reward_type="sparse", tolerance=TOLERANCE)
+    arms = sb3_vec_env("right", 9, goal_conditioned=True, tolerance=TOLERANCE)
     env = VecNormalize(arms, clip_obs=1e9)  # all goals are equally high: others would be clipped
     model = filled(env)
     samples = model.replay_buffer.sample(2000, env)

@@ -110,7 +110,6 @@ class TestAttributes:
         env = sb3_vec_env(GOALS, NUMBER)
         assert env.get_attr("render_mode") == [None] * NUMBER
         assert env.get_attr("simulator", indices=[0, 3]) == [env.simulator] * 2
-        assert env.get_attr("reward_type", indices=2) == ["sparse"]
         assert env.get_attr("spec")[0].id == GOALS
         assert env.get_attr("metadata")[0]["render_fps"] == 50
 

@@ -1,16 +1,20 @@
-"""The page of an arm in a real browser: contact as Coal has it, sliders, keys, small screens."""
+"""What touches in the playground, in a real browser, is what touches for Coal."""
 
 import coal
 import numpy as np
 import pinocchio as pin
 import pytest
+from random_policies import policy_for
 
 from kinarm.arm import Arm
 from kinarm.bodies import Body
 from kinarm.collision import ContactModel
 from kinarm.contact_pairs import make_verdicts_reliable
+from kinarm.evaluation.replay.playground import page_policy
+from kinarm.problem import PROBLEMS
 from kinarm.scene import Obstacle, Scene
-from kinarm.viewer import arm_page
+from kinarm.viewer.playground import play_page
+from kinarm.world import World
 
 ARMS = ("paper", "ur5")
 CLOSE, CLOSE_IF_ROUND = 1e-6, 2e-6
@@ -19,10 +23,6 @@ CLOSE, CLOSE_IF_ROUND = 1e-6, 2e-6
 TURNED = Obstacle(name="turned", lower=(0.25, -0.1, 0.0), upper=(0.4, 0.1, 0.2), yaw=0.6)
 WALL = Body(name="wall", shape="halfspace", position=(-0.6, 0.0, 0.0), rpy=(0.1, 1.5, 0.0))
 SCENE = Scene(obstacles=(*Scene().obstacles, TURNED, WALL))
-POSES = """(q) => {
-    kinarm.set(q);
-    return [q.map((_, k) => kinarm.pose(`axis_${k + 1}`)), kinarm.state.tool];
-}"""
 CONTACTS = "(qs) => qs.map((q) => kinarm.contacts(q).map(([a, b]) => [a, b]))"
 
 
@@ -58,30 +58,16 @@ def name(request):
     return request.param
 
 
-def arm_file(folder, arm):
-    arm_page(arm, folder / "arm.html", scene=SCENE)
-    return folder / "arm.html"
-
-
 @pytest.fixture(scope="module")
 def page(visit, tmp_path_factory, name):
-    """Its page, with obstacles around it."""
-    with visit(arm_file(tmp_path_factory.mktemp(name), name)) as opened:
+    """A playground of it, with obstacles around it."""
+    world = World(PROBLEMS["both"].replace(arm=name, scene=SCENE))
+    player = page_policy("random", policy_for(world.problem), world)
+    made = play_page(world, [player], world.arm.home[None], np.array([[0.3, -0.65, 0.325]]))
+    file = tmp_path_factory.mktemp(name) / "play.html"
+    made.save(file)
+    with visit(file) as opened:
         yield opened
-
-
-@pytest.fixture(scope="module")
-def paper_page(visit, tmp_path_factory):
-    with visit(arm_file(tmp_path_factory.mktemp("page"), "paper")) as opened:
-        yield opened
-
-
-@pytest.fixture
-def watched(paper_page):
-    """The page of the arm ``paper``, at home."""
-    paper_page.tell("kinarm.set([0, 0, 0, 0, 0, 0])")
-    paper_page.tell("document.activeElement.blur()")
-    return paper_page
 
 
 def near_contact(arm, coal_pairs, rng, count):
@@ -144,96 +130,3 @@ def test_contact_points_lie_in_both_bodies(page, name):
                 assert result.isCollision(), (shape.name, point)
                 checked += 1
     assert checked > 30
-
-
-def test_poses_are_those_of_pinocchio(page, name):
-    arm = Arm.load(name)
-    data = arm.model.createData()
-    for q in np.random.default_rng(2).uniform(arm.lower, arm.upper, (5, arm.n_joints)):
-        poses, tool = page.page.evaluate(POSES, q.tolist())
-        pin.forwardKinematics(arm.model, data, q)
-        for joint, pose in enumerate(poses, start=1):
-            found = np.array(pose).reshape(4, 4).T
-            np.testing.assert_allclose(found, data.oMi[joint].homogeneous, rtol=0, atol=1e-6)
-        np.testing.assert_allclose(tool, arm.tool_position(q), rtol=0, atol=1e-6)
-
-
-def test_nothing_is_fetched_and_nothing_fails(page):
-    page.tell("kinarm.set(kinarm.state.configuration.map(() => 0.2))")
-    assert len(page.requests) == 1
-    assert page.complaints == []
-    assert page.tell("kinarm.census()")["triangles"] > 5000
-
-
-def test_sliders_stay_within_limits(watched):
-    arm = Arm.load("paper")
-    watched.tell("kinarm.set([9, -9, 9, -9, 9, -9])")
-    configuration = watched.state["configuration"]
-    expected = np.where(np.arange(6) % 2, arm.lower, arm.upper)
-    np.testing.assert_array_equal(configuration, expected)
-    shown = watched.page.locator("#joints output").all_inner_texts()
-    assert shown == [f"{np.rad2deg(value):.1f}°" for value in expected]
-    slider = watched.page.locator("#joints input").nth(1)
-    slider.fill("0.5")
-    assert watched.state["configuration"][1] == 0.5
-
-
-def test_contact_is_told_and_goes(watched):
-    text = watched.page.locator
-    assert text("#verdict").inner_text() == "Free"
-    watched.tell("kinarm.set([0, 2.3, 0, 0, 0, 0])")
-    names = [" touches ".join(pair) for pair in watched.state["touching"]]
-    assert names
-    assert text("#verdict").inner_text() == "Contact"
-    assert names[0] in text("#touching").inner_text()
-    assert text("#spoken").inner_text() == names[0]
-    watched.page.click("#home")
-    assert watched.state["touching"] == []
-    assert watched.state["configuration"] == [0] * 6
-    assert text("#touching").inner_text() == ""
-
-
-def test_collision_shapes_are_switched_on(watched):
-    watched.tell("drawn = true; kinarm.set(kinarm.state.configuration)")
-    watched.page.wait_for_timeout(100)
-    before = watched.page.locator("#stage").screenshot()
-    watched.page.click("#shapes")
-    assert watched.state["shapes"]
-    watched.page.wait_for_timeout(100)
-    assert watched.page.locator("#stage").screenshot() != before
-    watched.page.click("#shapes")
-    assert not watched.state["shapes"]
-    watched.tell("drawn = false")
-
-
-def test_keys(watched):
-    press = watched.page.keyboard.press
-    for key, joint, value in (
-        ("ArrowDown", 0, 0.0),
-        ("ArrowDown", 1, 0.0),
-        ("ArrowRight", 1, np.deg2rad(1)),
-        ("Shift+ArrowLeft", 1, np.deg2rad(-9)),
-        ("ArrowUp", 1, np.deg2rad(-9)),
-        ("End", 0, Arm.load("paper").upper[0]),
-        ("h", 0, 0.0),
-    ):
-        press(key)
-        assert watched.state["configuration"][joint] == pytest.approx(value), key
-    for key, what, value in (("c", "shapes", True), ("t", "theme", "dark")):
-        before = watched.state[what]
-        press(key)
-        assert watched.state[what] == value != before
-        press(key)
-    press("?")
-    assert watched.page.locator("#keys").is_visible()
-    press("?")
-
-
-@pytest.mark.parametrize("size", [(390, 844), (844, 390), (320, 568)])
-def test_a_phone_shows_everything(watched, size):
-    watched.page.set_viewport_size({"width": size[0], "height": size[1]})
-    watched.tell("kinarm.set([0, 2.3, 0, 0, 0, 0])")
-    watched.check_fit(size, "#card", "#dock")
-    watched.page.locator("#joints input").last.scroll_into_view_if_needed()
-    assert watched.page.locator("#joints input").last.is_visible()
-    watched.page.set_viewport_size({"width": 800, "height": 600})
