@@ -28,6 +28,9 @@ from kinarm.viewer.parts import FINISHES, PLAIN, ArmPart, packed_colour, shape_f
 
 Element = ElementTree.Element
 
+LOOKS = ("looks", 1)
+"""Kind and version of the files of looks, which ``docs/make_arm_looks.py`` makes."""
+
 TOOL_RADIUS = 0.012
 """Radius of the tool's ball; for a reach below 1 m, times the reach [m]."""
 
@@ -81,7 +84,7 @@ def stored_parts(arm: Arm) -> Iterator[ArmPart]:
     looks = arm.description.path.with_suffix(".npz")
     if looks not in map(absolute, shipped_files("arms", ".npz").values()):
         return
-    header, arrays = load_archive(looks, "looks", 1, ArmError)
+    header, arrays = load_archive(looks, *LOOKS, ArmError)
     if [*arm.joint_names] != header["names"] or not np.allclose(arm.chain.tool, header["tool"]):
         return
     base = arm.model.frames[1].placement  # of the link fixed in the world
