@@ -137,8 +137,8 @@ def measure_training(problem: ReachProblem, repetitions: int) -> dict[str, Any]:
 
 
 def measure_ppo(problem: ReachProblem) -> dict[str, Any]:
-    """Time and steps of a training with PPO's tuned recipe."""
-    config = recipe("ppo", "tuned", problem=problem)
+    """Time and steps of a training with PPO's recipe ``paper``."""
+    config = recipe("ppo", "paper", problem=problem)
     train_policy(replace(config, iterations=1))  # compiles
     state = train_policy(config).state
     return {"seconds": state.wall_time, "environment_steps": state.environment_steps}

@@ -17,9 +17,7 @@ PREFETCHED = 32
 """Scenarios drawn at a time for the episodes of an arm."""
 
 
-def draw_scenarios(
-    world: World, rng: np.random.Generator, count: int, *, start_spread: float | None = None
-) -> tuple[Array, Array]:
+def draw_scenarios(world: World, rng: np.random.Generator, count: int) -> tuple[Array, Array]:
     """Draw starts, shape (count, n_joints) [rad or m], and goals, shape (count, goal_width).
 
     Goals are uniform over the task's regions, with rests as the task says. Each
@@ -33,19 +31,13 @@ def draw_scenarios(
     ----------
     world, rng, count
         World of the problem, source of randomness, and number.
-    start_spread : float, optional
-        Instead of the task's.
     """
-    starts, goals = draw_for_each(world, [rng], count, start_spread=start_spread)
+    starts, goals = draw_for_each(world, [rng], count)
     return starts[0], goals[0]
 
 
 def draw_for_each(
-    world: World,
-    rngs: Sequence[np.random.Generator],
-    count: int,
-    *,
-    start_spread: float | None = None,
+    world: World, rngs: Sequence[np.random.Generator], count: int
 ) -> tuple[Array, Array]:
     """Draw starts and goals from several generators, and screen them together.
 
@@ -54,14 +46,14 @@ def draw_for_each(
 
     Parameters
     ----------
-    world, count, start_spread
+    world, count
         As for `draw_scenarios`.
     rngs : sequence of numpy.random.Generator
         Sources of randomness.
     """
     whole_number("count", count, 0)
     arm, task, n_actions = world.arm, world.problem.task, world.n_actions
-    spread = task.start_spread if start_spread is None else start_spread
+    spread = task.start_spread
     lower = (arm.home + spread * (arm.lower - arm.home))[:n_actions]
     extent = (spread * (arm.upper - arm.lower))[:n_actions]
     width, solved = world.goals.n_uniforms, task.reachable_goals or world.goals.solved

@@ -183,17 +183,15 @@ class Simulator(EpisodeRunner):
         """The same simulator without the bodies that move."""
         return self._in(self.world.without_moving_bodies())
 
-    def sample(
-        self, rng: np.random.Generator, count: int, *, start_spread: float | None = None
-    ) -> tuple[Array, Array]:
+    def sample(self, rng: np.random.Generator, count: int) -> tuple[Array, Array]:
         """Draw starts and goals.
 
         Parameters
         ----------
-        rng, count, start_spread
+        rng, count
             As for `kinarm.scenarios.draw_scenarios`.
         """
-        return draw_scenarios(self.world, rng, count, start_spread=start_spread)
+        return draw_scenarios(self.world, rng, count)
 
     def reset(
         self,

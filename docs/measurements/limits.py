@@ -120,7 +120,7 @@ def measure_times(policy: Policy) -> Iterator[tuple[str, dict[str, float]]]:
     simulator.rollout(policy, *scenarios)
     what = f"rollouts of {BATCH} episodes"
     yield what, time_shares(lambda: simulator.rollout(policy, *scenarios))
-    for learner, name in (("ars", "paper"), ("ars", "tuned"), ("ppo", "tuned")):
+    for learner, name in (("ars", "paper"), ("ars", "tuned"), ("ppo", "quick")):
         try:
             run = _iterations(learner, name, policy.problem)
         except MissingExtraError:

@@ -16,7 +16,7 @@ TABLE_1: dict[str, Any] = {"trials": TRIALS}
 """The paper's settings."""
 PPO: dict[str, Any] = {
     "learner": "ppo",
-    "recipe": "tuned",
+    "recipe": "paper",
     "trials": TRIALS,
     "fixed": {"iterations": 300},
 }

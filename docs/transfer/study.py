@@ -1,8 +1,8 @@
 """Policies of the paper's task 1 on tasks 2 and 3 and on another arm: two experiments.
 
 The first trains policies on the first task. The second trains on the other ones, from scratch and
-beginning with these policies. All trainings have the recipe ``tuned`` without its mirror, with
-which there would be nothing left to ask: a policy with a mirror is as good on both sides.
+beginning with these policies. No training has a mirror, with which there would be nothing left to
+ask: a policy with a mirror is as good on both sides.
 """
 
 from collections.abc import Iterator, Mapping
@@ -21,6 +21,8 @@ from kinarm.problem import PROBLEMS, ReachProblem
 
 FIRST_SEEDS = {"source": 0, "scratch": 1000, "warm": 2000}
 """Training seeds by role: no two trainings of a learner on a task share random numbers."""
+
+RECIPES = {"ars": "tuned", "ppo": "paper"}
 
 TESTED = {"tested_configurations": 4}
 """How steps are tested for contact, as when it was recorded."""
@@ -128,7 +130,7 @@ class TransferStudy:
             Entry(
                 name=f"{learner} source 1",
                 learner=learner,
-                recipe="tuned",
+                recipe=RECIPES[learner],
                 problems=(SOURCE.name,),
                 seeds=self.seeds,
                 fixed=self._fixed(learner),
@@ -141,14 +143,14 @@ class TransferStudy:
         """Trainings on the other tasks."""
         entries = []
         for problem, learner, length in product(targets(), self.learners, self.lengths):
-            whole = recipe(learner, "tuned", problem=problem, **self._fixed(learner))
+            whole = recipe(learner, RECIPES[learner], problem=problem, **self._fixed(learner))
             fixed = {
                 **self._fixed(learner),
                 **({"problem.arm": OTHER_ARM} if problem.arm != SOURCE.arm else {}),
                 "problem.name": problem.name,
                 "iterations": max(1, round(length * whole.iterations)),
             }
-            shared = {"learner": learner, "recipe": "tuned"}
+            shared = {"learner": learner, "recipe": RECIPES[learner]}
             shared["problems"] = (SOURCE.name if problem.arm != SOURCE.arm else problem.name,)
             kind = f"{problem.name} {length}"
             entries.append(

@@ -200,7 +200,7 @@ def _add_learner(
 
 def _epilog(name: str, learner: Learner[Any, Any]) -> str:
     """Recipes of a learner, and examples."""
-    recipe = "tuned" if "tuned" in learner.recipes else learner.first_recipe
+    recipe = [*learner.recipes][:2][-1]  # the first has defaults
     lines = (f"  {each:<8} {summary}\n" for each, summary in learner.summaries.items())
     text = shipped_files("help", ".txt")["learner"].read_text()
     return text.format(

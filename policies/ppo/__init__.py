@@ -80,18 +80,9 @@ class PPOConfig(TrainingConfig):
         Whether the policy treats mirror images alike, if arm and obstacles are
         symmetric; it then learns from goals on the right and mirror images of
         others.
-    initial_start_spread : float
-        Initial spread of the start configurations, as a share of the task's.
-    initial_gamma : float, optional
-        Initial discount per step; by default ``gamma``.
-    initial_penalty : float
-        Share of the penalty for contact that counts at first; it grows linearly
-        to the whole.
     intervention_penalty : float
         Taken from the reward of a step that a shield replaces; without it, a
         policy learns to lean on its shield.
-    widening : float
-        Share of the training in which spread and discount change linearly.
     replay_share : float
         Probability that an episode begins where an earlier one failed; see
         `kinarm.failed_scenarios`.
@@ -127,11 +118,7 @@ class PPOConfig(TrainingConfig):
     training_speed: float | None = field(default=None, metadata={**POSITIVE, **OPTIONAL})
     residual: bool = field(default=False, metadata=OPTIONAL)
     symmetric: bool = False
-    initial_start_spread: float = field(default=1.0, metadata=SHARE)
-    initial_gamma: float | None = field(default=None, metadata=SHARE)
-    initial_penalty: float = field(default=1.0, metadata=SHARE)
     intervention_penalty: float = field(default=0.0, metadata={**NOT_NEGATIVE, **OPTIONAL})
-    widening: float = field(default=0.0, metadata=SHARE)
     replay_share: float = field(default=0.0, metadata={**SHARE, **OPTIONAL})
     replay_size: int = field(default=8192, metadata={"at_most": LARGEST_REPLAY, **OPTIONAL})
     replay_log_std: float | None = field(default=None, metadata=OPTIONAL)
@@ -144,7 +131,6 @@ class PPOConfig(TrainingConfig):
         "training_tolerance": "the task's",
         "training_hold": "the task's",
         "training_speed": "the task's",
-        "initial_gamma": "gamma",
         "replay_log_std": "none, noise as in others",
     }
     """Meaning of leaving out an option that has no default value."""
@@ -184,33 +170,12 @@ class PPOConfig(TrainingConfig):
             reward=self.reward, tolerance=self.training_tolerance, goal=goal or None
         )
 
-    def start_spread_at(self, done: float) -> float:
-        """Spread of the start configurations after this share of the training."""
-        return self.problem.task.start_spread * self._widened(self.initial_start_spread, 1.0, done)
-
-    def gamma_at(self, done: float) -> float:
-        """Discount per step after this share of the training."""
-        if self.initial_gamma is None:
-            return self.gamma
-        return self._widened(self.initial_gamma, self.gamma, done)
-
     def log_std_at(self, done: float) -> float | None:
         """Logarithm of the deviation after a share of the training, if set."""
         if self.final_log_std is None:
             return None
         settled = min(1.0, done / SETTLED)
         return (1 - settled) * self.log_std_init + settled * self.final_log_std
-
-    def penalty_at(self, done: float) -> float:
-        """Share of the penalty for contact that counts after this share of the training."""
-        return self.initial_penalty + (1 - self.initial_penalty) * done
-
-    def _widened(self, initial: float, final: float, done: float) -> float:
-        """A value between two, after this share of the training."""
-        if done >= self.widening:
-            return final
-        grown = done / self.widening
-        return (1 - grown) * initial + grown * final
 
 
 class EpisodeStates(NamedTuple):

@@ -4,7 +4,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kinarm.failed_scenarios import StartsAndGoals
-from kinarm.kernels.reward import COLLISION
 from kinarm.policies.mirror import problem_mirror
 from kinarm.policies.normalizer import input_scale
 from kinarm.policies.ppo import EpisodeStates, PPOConfig, PPOState
@@ -40,18 +39,14 @@ class TrainingArms:
         self.simulator = config.simulator(threads=1)
         self.mirror = problem_mirror(config.problem) if config.symmetric else None
 
-    def sample(
-        self, rng: np.random.Generator, count: int, start_spread: float | None = None
-    ) -> StartsAndGoals:
+    def sample(self, rng: np.random.Generator, count: int) -> StartsAndGoals:
         """Draw starts and goals without replay; see `kinarm.Simulator.sample`."""
-        drawn = self.simulator.sample(rng, count, start_spread=start_spread)
+        drawn = self.simulator.sample(rng, count)
         return drawn if self.mirror is None else self.mirror.scenarios_from_the_right(*drawn)
 
     def restore(self, state: PPOState, rng: np.random.Generator) -> None:
         """Go on with a state's episodes; the generator draws later ones."""
-        config, done = self.config, state.iteration / self.config.iterations
-        self._rng, self._start_spread = rng, config.start_spread_at(done)
-        self._remitted = 1.0 - config.penalty_at(done)
+        self._rng = rng
         self._mean, self._scale = state.normalizer.mean, input_scale(state.normalizer.std)
         begun = EpisodeStates._make(map(np.copy, state.episodes))
         scenarios, start, taken = (begun.q, begun.goal), begun.start, begun.steps
@@ -99,7 +94,7 @@ class TrainingArms:
         episodes = self.episodes
         replaced = episodes.interventions.copy()
         result = self.simulator.step(episodes, actions)
-        rewards = result.reward - self._remitted * result.terms[:, COLLISION]
+        rewards = result.reward.copy()
         if len(replaced):
             rewards -= self.config.intervention_penalty * (episodes.interventions - replaced)
         self._total += rewards
@@ -121,7 +116,7 @@ class TrainingArms:
             self.failed = self.failed.followed_by(*scenarios, config.replay_size)
 
         def draw(places: NDArray[np.int64]) -> StartsAndGoals:
-            return self.sample(self._rng, len(places), self._start_spread)
+            return self.sample(self._rng, len(places))
 
         scenarios, self.replayed[rows] = self.failed.mixed(
             config.replay_share, self._rng, len(rows), draw
@@ -137,7 +132,6 @@ def collect(
     arms: TrainingArms,
     rng: np.random.Generator,
     *,
-    gamma: float,
     threads: int,
 ) -> Experience:
     """Step the arms, then judge all steps at once.
@@ -153,8 +147,6 @@ def collect(
         What is stepped.
     rng : numpy.random.Generator
         Draws the noise of actions.
-    gamma : float
-        Discount per step.
     threads : int
         Threads that find values.
     """
@@ -176,9 +168,9 @@ def collect(
     flat = observations.reshape(-1, observations.shape[-1])
     values = networks.values(np.concatenate([flat, arms.observe(), *arms.finals]), threads)
     end = len(flat) + config.n_envs
-    rewards[steps, np.concatenate(arms.cut_short)] += np.float32(gamma) * values[end:]
+    rewards[steps, np.concatenate(arms.cut_short)] += np.float32(config.gamma) * values[end:]
     values = values[:end].reshape(-1, config.n_envs)
-    advantages = estimate_advantages(rewards, values, going_on, gamma, config.gae_lambda)
+    advantages = estimate_advantages(rewards, values, going_on, config.gamma, config.gae_lambda)
     parts = (observations, actions, scales, densities, advantages, advantages + values[:-1])
     # Arm after arm, as in Stable-Baselines3.
     return Experience(*(part.swapaxes(0, 1).reshape(-1, *part.shape[2:]) for part in parts))

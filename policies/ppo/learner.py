@@ -66,7 +66,7 @@ class PPOTraining:
         config, arms = self.config, self.arms
         rng, scenarios = seed_iteration(config.seed, 0)
         seen = self._seen(scenarios)
-        starts, goals = arms.sample(scenarios, config.n_envs, config.start_spread_at(0.0))
+        starts, goals = arms.sample(scenarios, config.n_envs)
         parameters = initial_parameters(rng, self._widths, config.log_std_init)
         normalizer = Normalizer.of(seen)
         if config.initial_policy is not None:
@@ -104,14 +104,13 @@ class PPOTraining:
                 f"the state to resume has {sizes[0]} parameters and {sizes[1]} arms, "
                 f"not {expected[0]} and {expected[1]}"
             )
-        done = state.iteration / config.iterations
         rng, scenarios = seed_iteration(config.seed, state.iteration + 1)
         networks.load(state.parameters)
-        log_std = config.log_std_at(done)
+        log_std = config.log_std_at(state.iteration / config.iterations)
         if log_std is not None:
             networks.log_std[:] = log_std
         arms.restore(state, scenarios)
-        experience = collect(networks, arms, rng, gamma=config.gamma_at(done), threads=self.threads)
+        experience = collect(networks, arms, rng, threads=self.threads)
         moments = networks.scattered(state.first_moment), networks.scattered(state.second_moment)
         update(config, state.iteration, networks, moments, experience, rng, self.threads)
         vectors = [networks.gathered(each) for each in (networks.weights, *moments)]

@@ -30,7 +30,7 @@ PLAYER = "document.querySelector('#worst iframe').contentWindow.kinarm"
 def evaluations():
     """Two recipes on one task, one on another, beside the oracle."""
     made = []
-    for problem, names in (("right", ("ars-tuned-both", "ppo-tuned-both")), ("both", ("zero",))):
+    for problem, names in (("right", ("ars-tuned-both", "ppo-best-both")), ("both", ("zero",))):
         trials = TrialSet.draw(problem, 20, seed=3)
         bounds = oracle_bounds(trials)
         contestants = [each for name in names for each in find_contestants(name)]

@@ -28,7 +28,7 @@ def written(write: Callable[[Path], object], name: str = "file.npz") -> bytes:
 
 def policies() -> list[bytes]:
     """A linear policy, and one with hidden layers."""
-    names = ("ars-tuned-both-seed0", "ppo-tuned-both-seed0")
+    names = ("ars-tuned-both-seed0", "ppo-best-both-seed0")
     return [written(load_policy(name).save) for name in names]
 
 

@@ -60,10 +60,10 @@ def test_everything_is_measured(counted, monkeypatch):
 
 
 def test_a_training_by_ppo(monkeypatch):
-    tiny = {"iterations": 3, "n_envs": 4, "batch_size": 64, "net_arch": (8, 8)}
+    tiny = {"iterations": 3, "n_envs": 4, "batch_size": 50, "net_arch": (8, 8)}
     monkeypatch.setattr(bench, "recipe", partial(recipe, **tiny))
     trained = bench.measure_ppo(PROBLEMS["left"])
-    assert trained["environment_steps"] == 3 * 4 * 16
+    assert trained["environment_steps"] == 3 * 4 * 125
     assert json.loads(json.dumps(trained)) == trained
 
 

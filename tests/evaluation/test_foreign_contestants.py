@@ -150,7 +150,7 @@ class TestModel:
             find_contestants(tmp_path / "model.zip", vec_normalize="none")
 
 
-@pytest.mark.parametrize("policy", ["ppo-tuned-both", "ars-tuned-both"])
+@pytest.mark.parametrize("policy", ["ppo-paper-right", "ars-tuned-both"])
 @pytest.mark.parametrize("name", ["kinarm/ReachRight-v0", "kinarm/ReachGoalRight-v0"])
 def test_stable_baselines3_evaluates_every_policy(policy, name):
     evaluation = pytest.importorskip("stable_baselines3.common.evaluation")

@@ -20,7 +20,7 @@ ROOT = Path(__file__).parents[2]
 PAPER = [(algorithm, "paper", problem) for algorithm in ("ars", "ppo") for problem in PROBLEMS]
 OURS = [
     *(("ars", named) for named in ("tuned", "linear", "best")),
-    *(("ppo", named) for named in ("tuned", "best")),
+    ("ppo", "best"),
 ]
 SEEDS = {
     **{"-".join(group): 4 for group in PAPER},
@@ -38,6 +38,8 @@ def test_all_of_them_ship_and_nothing_else():
 
 
 RECEIVED = asdict(RewardWeights())
+GONE = {"initial_start_spread": 1.0, "initial_penalty": 1.0, "widening": 0.0}
+"""Settings that are gone, at the values at which they did nothing."""
 
 
 def settings_of(config):
@@ -56,7 +58,8 @@ def settings_of(config):
 
 def assert_made_by(config, made):
     """Settings that have come since it was trained had no other value then."""
-    released, config = settings_of(config), dict(made.config)
+    released = settings_of(config)
+    config = {name: value for name, value in made.config.items() if GONE.get(name) != value}
     reward = {**RECEIVED, **config.get("reward", asdict(made.problem.task.reward))}
     assert {**released, **config, "reward": reward} == released
     assert made.commit
@@ -127,7 +130,6 @@ def test_symmetric_policies_treat_mirror_images_alike():
         ("ars-tuned", 0.94),
         ("ars-linear", 0.96),
         ("ars-best", 0.975),
-        ("ppo-tuned", 0.90),
         ("ppo-best", 0.99),
     ],
 )

@@ -1,4 +1,4 @@
-"""The script of transfer comes to the figures that version 1.0.0 recorded, to the last bit.
+"""The script of transfer comes to the figures of ARS that version 1.0.0 recorded, to the bit.
 
 Intervals are of a later kind.
 """
@@ -16,9 +16,10 @@ from docs.transfer.study import Protocol, TransferStudy
 @pytest.mark.slow
 def test_a_small_study(tmp_path):
     study = TransferStudy(
+        learners=("ars",),
         seeds=2,
         lengths=(1.0, 0.5),
-        settings={"ars": {"iterations": 12}, "ppo": {"iterations": 4}},
+        settings={"ars": {"iterations": 12}},
         protocol=Protocol(trials=60, looks=6, look_trials=40),
     )
     document = json.loads(json.dumps(transfer_document(study, study.run(tmp_path), "frozen")))

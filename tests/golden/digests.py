@@ -89,7 +89,7 @@ def rollout_digests() -> dict[str, str]:
             found[f"rollouts {arm} {task} random"] = of_rollouts(
                 simulator.rollout_actions(actions, starts, goals, record=True)
             )
-            groups = (f"ars-paper-{task}", "ars-tuned-both", "ppo-tuned-both", "ppo-best-both")
+            groups = (f"ars-paper-{task}", "ars-tuned-both", "ppo-best-both")
             for group in (*groups, f"ppo-paper-{task}") if arm == "paper" else groups:
                 policy = load_policy(f"{group}-seed1")
                 shift = np.linspace(-0.5, 0.5, policy.n_observations)
@@ -136,20 +136,13 @@ def ppo_digests() -> dict[str, str]:
     from kinarm.policies.ppo import PPOState
 
     found = {}
-    again = {"replay_share": 0.5}
-    for name, task, changes in (
-        ("paper", "right", {}),
-        ("tuned", "left", {}),
-        ("tuned", "both", {}),
-        ("tuned", "right", again),
-        ("best", "both", {}),
-    ):
+    for name, task in (("paper", "right"), ("quick", "left"), ("best", "both")):
         states: list[PPOState] = []
         made = recipe("ppo", name, problem=PROBLEMS[task], seed=2)
-        config = replace(made, iterations=3, **changes)
+        config = replace(made, iterations=3)
         train_policy(config, on_iteration=states.append)
         state = states[-1]
-        found[f"ppo {name} {task}{' replay' if changes == again else ''}"] = led_to(
+        found[f"ppo {name} {task}"] = led_to(
             str(to_plain(config)),
             digest(
                 [

@@ -23,7 +23,7 @@ def show(*arrays):
 
 simulator = Simulator("both")
 starts, goals = simulator.sample(np.random.default_rng(0), 64)
-rollouts = simulator.rollout(load_policy("ppo-tuned-both-seed0"), starts, goals, record=True)
+rollouts = simulator.rollout(load_policy("ppo-best-both-seed0"), starts, goals, record=True)
 show(starts, goals, rollouts.returns, rollouts.steps, rollouts.paths)
 world = simulator.world
 poses = world.poses(starts)
@@ -45,7 +45,7 @@ for name, problem in (("paper", "right"), ("tuned", "both")):
     curve = np.array([point[:4] for point in state.curve])
     show(state.theta, state.normalizer.mean, state.normalizer.squares, curve)
 small = dict(n_envs=50, n_steps=6, batch_size=100, n_epochs=2, iterations=3, net_arch=(40, 24))
-for name in ("paper", "tuned"):
+for name in ("paper", "quick"):
     state = train_policy(replace(recipe("ppo", name, problem="both", seed=1), **small)).state
     show(state.parameters, state.first_moment, state.second_moment, state.episodes.q)
 """

@@ -12,7 +12,6 @@ from simulators import changed
 from kinarm.arm import ArmSpecification
 from kinarm.errors import InvalidInputError, ProblemError
 from kinarm.problem import PROBLEMS, ReachProblem
-from kinarm.scenarios import draw_scenarios
 from kinarm.scene import GoalRegion, Obstacle, Scene
 from kinarm.simulator import Simulator
 from kinarm.task import ReachTask
@@ -58,13 +57,6 @@ def test_no_spread_starts_at_home(simulator):
     starts, goals = changed(simulator, start_spread=0).sample(np.random.default_rng(21), 50)
     np.testing.assert_array_equal(starts, np.zeros((50, 6)))
     assert len(np.unique(goals, axis=0)) == 50
-
-
-def test_given_spread_comes_before_that_of_the_task(simulator):
-    drawn = draw_scenarios(simulator.world, np.random.default_rng(3), 20, start_spread=0.3)
-    near = changed(simulator, start_spread=0.3).sample(np.random.default_rng(3), 20)
-    np.testing.assert_array_equal(drawn[0], near[0])
-    np.testing.assert_array_equal(drawn[1], near[1])
 
 
 def test_box_where_the_arm_starts_leaves_no_start(simulator):

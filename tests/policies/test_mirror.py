@@ -204,7 +204,7 @@ class TestTransferByReflection:
         shown = [each for each in posed if (each.observation, each.task.goal) == seen]
         symmetric = [problem for problem in shown if not missing_mirror(problem)]
         assert len(symmetric) >= 10 if arm in SYMMETRIC_ARMS else not symmetric
-        learnt = load_policy("ppo-tuned-both-seed0"), load_policy("ars-tuned-both-seed0")
+        learnt = load_policy("ppo-paper-both-seed0"), load_policy("ars-tuned-both-seed0")
         plain = *learnt, lively(make_policy(8, seed=4), 30)
         for problem, policy in product(symmetric, plain):
             simulator = Simulator(problem, threads=1)

@@ -40,14 +40,14 @@ def shrunk(point):
     return tuple(SCALE * number for number in point)
 
 
-@pytest.mark.parametrize("learner", ["ars", "ppo"])
+@pytest.mark.parametrize(("learner", "name"), [("ars", "tuned"), ("ppo", "best")])
 @pytest.mark.parametrize("problem", sorted(PROBLEMS))
-def test_for_the_papers_arm_nothing_is_scaled(learner, problem):
-    made, named = recipe(learner, "tuned", problem=problem), find_learner(learner).recipes["tuned"]
-    assert made.reward.progress == 1.0
+def test_for_the_papers_arm_nothing_is_scaled(learner, name, problem):
+    made, named = recipe(learner, name, problem=problem), find_learner(learner).recipes[name]
+    assert made.reward.progress == {"tuned": 1.0, "best": 5.0}[name]
     assert made.net_arch == named.net_arch
     assert made.symmetric
-    assert getattr(made, "training_tolerance", 0.03) == 0.03
+    assert getattr(made, "training_tolerance", 0.0006) == 0.0006
 
 
 OURS = [
@@ -72,15 +72,16 @@ def test_every_recipe_of_ours_is_adapted(half_right, learner, name):
 def test_progress_counts_in_the_arms_reach(half_right):
     assert half_right.load_arm().reach == pytest.approx(SCALE * 1.263671568590896)
     for learner in ("ars", "ppo"):
-        made = recipe(learner, "tuned", problem=half_right)
-        original = recipe(learner, "tuned", problem="right")
-        assert made.reward == replace(original.reward, progress=1 / SCALE)
+        made = recipe(learner, "best", problem=half_right)
+        original = recipe(learner, "best", problem="right")
+        scaled = original.training_problem.task.reward.progress / SCALE
+        assert made.reward == replace(original.reward, progress=scaled)
 
 
 def test_ppo_learns_the_same_in_a_world_of_half_the_size(half_right):
-    small = {"iterations": 12, "n_epochs": 2, "seed": 1}
-    half = train_policy(recipe("ppo", "tuned", problem=half_right, **small))
-    whole = train_policy(recipe("ppo", "tuned", problem="right", **small))
+    small = {"iterations": 12, "n_epochs": 2, "seed": 1, "residual": False}
+    half = train_policy(recipe("ppo", "quick", problem=half_right, **small))
+    whole = train_policy(recipe("ppo", "quick", problem="right", **small))
     for ours, theirs in zip(half.curve, whole.curve, strict=True):
         assert ours.environment_steps == theirs.environment_steps
         assert ours.success == pytest.approx(theirs.success, nan_ok=True)
@@ -93,12 +94,9 @@ def test_ppo_learns_the_same_in_a_world_of_half_the_size(half_right):
 def test_where_no_reflection_helps():
     scene = PROBLEMS["both"].scene
     lopsided = PROBLEMS["both"].replace(scene=replace(scene, obstacles=scene.obstacles[:1]))
-    ars, ppo = (recipe(learner, "tuned", problem=lopsided) for learner in ("ars", "ppo"))
+    ars = recipe("ars", "tuned", problem=lopsided)
     assert recipe("ars", "linear", problem=lopsided).net_arch == ()
     assert (ars.recipe, ars.net_arch, ars.symmetric) == ("tuned", (16,), False)
-    assert (ppo.recipe, ppo.reward.progress, ppo.symmetric) == ("tuned", 12.0, False)
-    assert ppo.gamma_at(0) < ppo.gamma_at(1)
-    assert ppo.penalty_at(0) < ppo.penalty_at(1)
     ours = find_learner("ppo").recipes
     unchanged = replace(ours["best"], problem=lopsided, symmetric=False)
     assert recipe("ppo", "best", problem=lopsided) == unchanged

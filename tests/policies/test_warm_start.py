@@ -47,8 +47,8 @@ def test_ars_begins_with_a_network(network_file):
 
 
 def test_ppo_begins_with_an_actor():
-    name = "ppo-tuned-both-seed2"
-    config = PPOConfig(problem="left", initial_policy=name, net_arch=(64, 64, 64))
+    name = "ppo-paper-both-seed2"
+    config = PPOConfig(problem="left", initial_policy=name)
     same_deeds(first_policy(config), load_policy(name))
 
 

@@ -36,7 +36,12 @@ AWKWARD = PPOConfig(
 CONFIGS = {
     "awkward": AWKWARD,
     "paper": recipe("ppo", "paper"),
-    "tuned": recipe("ppo", "tuned", problem="both"),
+    "quick": replace(
+        recipe("ppo", "quick", problem="both"),
+        residual=False,
+        replay_share=0.0,
+        replay_log_std=None,
+    ),
 }
 
 
@@ -97,7 +102,7 @@ def begun(config):
     training.networks.load(state.parameters)
     training.arms.restore(state, np.random.default_rng(8))
     rng = np.random.default_rng(7)
-    experience = collect(training.networks, training.arms, rng, gamma=config.gamma, threads=1)
+    experience = collect(training.networks, training.arms, rng, threads=1)
     return training, state, experience
 
 

@@ -216,20 +216,6 @@ class TestReplay:
         assert len(np.concatenate(arms.returns)) == len(new)
 
 
-def test_a_share_of_the_penalty(begun):
-    """All else is rewarded as before."""
-    (whole, _), (mild, _) = begun(number=60), begun(number=60, initial_penalty=0.25)
-    rng, touched = np.random.default_rng(3), 0
-    for _ in range(30):
-        actions = rng.uniform(-1, 1, (60, 5))
-        (rewards, _), (milder, _) = whole.step(actions), mild.step(actions)
-        touching = rewards < -0.8
-        expected = rewards - 0.75 * REWARD.collision * touching
-        np.testing.assert_allclose(milder, expected, rtol=0, atol=1e-6)
-        touched += touching.sum()
-    assert touched > 5
-
-
 def test_steps_that_a_shield_replaces_have_a_price(begun):
     free, dear = (begun(shield=True, intervention_penalty=price)[0] for price in (0.0, 0.5))
     replaced = 0

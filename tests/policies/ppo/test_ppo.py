@@ -108,7 +108,7 @@ class TestAdvantages:
             training.networks.load(state.parameters)
             training.arms.restore(state, np.random.default_rng(1))
             given = (training.networks, training.arms, np.random.default_rng(2))
-            found = collect_rollout(*given, gamma=self.GAMMA, threads=1)
+            found = collect_rollout(*given, threads=1)
             return found.advantages.reshape(2, 3), found.returns.reshape(2, 3)
 
         return collect
@@ -233,37 +233,6 @@ def test_policy_acts_like_the_actor(trained):
     np.testing.assert_allclose(policy(observations), expected, rtol=0, atol=1e-5)
 
 
-def test_starts_spread_out_as_configured():
-    """From home at the beginning, over the whole range from half of the training on."""
-    config = replace(
-        TINY,
-        iterations=9,
-        problem=PROBLEMS["both"].replace(horizon=2),
-        initial_start_spread=0.0,
-        widening=0.5,
-        training_tolerance=0.01,
-    )
-    assert [config.start_spread_at(done) for done in (0, 0.25, 0.5, 1)] == [0, 0.5, 1, 1]
-    states = [PPOTraining(config).initial_state()]
-    train_policy(config, on_iteration=states.append)
-    home = config.simulator().arm.home
-    limit = 2 * config.simulator().step_limit
-    moved = [np.abs(state.episodes.q - home)[:, :5] for state in states]
-    assert (moved[0] == 0).all()
-    assert (moved[1] <= limit + 1e-9).all()
-    assert (moved[-1] > limit).any()
-
-
-def test_discount_of_each_iteration():
-    """The first one looks as far ahead as it is told to, the next ones farther."""
-    changing = replace(TINY, gamma=0.99, initial_gamma=0.5, widening=0.5)
-    begun, states = train_policy(replace(TINY, gamma=0.5, iterations=1)).state, []
-    train_policy(changing, on_iteration=states.append)
-    np.testing.assert_array_equal(states[0].first_moment, begun.first_moment)
-    constant = train_policy(replace(TINY, gamma=0.5, iterations=2), state=states[0]).state
-    assert (states[1].first_moment != constant.first_moment).any()
-
-
 def test_seeds_differ(trained):
     config, result, _ = trained
     other = train_policy(replace(config, seed=6)).policy
@@ -297,7 +266,7 @@ def test_replays_are_explored_with_more_noise():
     training.networks.load(state.parameters)
     training.arms.restore(state, np.random.default_rng(1))
     given = (training.networks, training.arms, np.random.default_rng(2))
-    found = collect_rollout(*given, gamma=0.99, threads=1)
+    found = collect_rollout(*given, threads=1)
     deviations = found.actions - training.networks.means(found.observations)
     wide = np.abs(deviations).max(axis=1) > 0.12  # 6.5 narrow deviations
     assert 0.2 < wide.mean() < 0.8

@@ -28,31 +28,12 @@ def test_bad_settings_are_refused(settings, words):
         PPOConfig(**settings)
 
 
-def test_discount_widens_as_the_starts_do():
-    config = PPOConfig(gamma=0.9, initial_gamma=0.5, widening=0.5)
-    assert [config.gamma_at(done) for done in (0, 0.25, 0.5, 1)] == [0.5, 0.7, 0.9, 0.9]
-    assert PPOConfig(gamma=0.9, widening=0.5).gamma_at(0.3) == 0.9
-
-
-def test_penalty_grows_to_the_end():
-    config = PPOConfig(initial_penalty=0.2, widening=0.5)
-    assert [config.penalty_at(done) for done in (0, 0.5, 1)] == pytest.approx([0.2, 0.6, 1])
-    assert [PPOConfig().penalty_at(done) for done in (0, 0.3, 1)] == [1, 1, 1]
-
-
 def test_noise_is_learnt_or_falls_to_the_end():
     assert PPOConfig(log_std_init=-1.0).log_std_at(0.5) is None
     config = PPOConfig(log_std_init=-1.0, final_log_std=-3.0)
     assert [config.log_std_at(done) for done in (0, 0.45, 0.9, 1)] == pytest.approx(
         [-1, -2, -3, -3]
     )
-
-
-def test_starts_widen_to_the_spread_of_the_task():
-    problem = PROBLEMS["right"].replace(start_spread=0.5)
-    config = PPOConfig(problem=problem, initial_start_spread=0.2, widening=0.5)
-    spreads = [config.start_spread_at(done) for done in (0, 0.25, 0.5)]
-    assert spreads == pytest.approx([0.1, 0.3, 0.5])
 
 
 def test_training_differs_from_the_problem_in_reward_and_tolerance():

@@ -83,7 +83,7 @@ def test_learners_show_the_rates_and_add_to_them():
     networks.load(state.parameters)
     arms.restore(state, np.random.default_rng(0))
     q, goals = arms.episodes.q.copy(), arms.episodes.goal.copy()
-    collect(networks, arms, np.random.default_rng(0), gamma=0.99, threads=1)
+    collect(networks, arms, np.random.default_rng(0), threads=1)
     expected = arms.simulator.rollout(policy, q, goals, record=True).paths[:, 5]
     going = arms.episodes.steps == 5
     assert going.sum() > 4
