@@ -18,7 +18,7 @@ from kinarm.policies.learners import TrainingState, find_learner
 
 T = TypeVar("T")
 
-ARCHIVE = ("checkpoint", 2)
+ARCHIVE = ("checkpoint", 3)
 """Kind and version of the files."""
 
 CHECKPOINT_SECONDS = 5.0

@@ -231,6 +231,8 @@ class PPOState(TrainingState):
         The running episodes.
     failed : FailedScenarios
         What may be replayed.
+    scenarios : int
+        Scenarios drawn so far, but for replays.
     curve : tuple of CurvePoint
         One point per finished iteration.
     """
@@ -241,6 +243,7 @@ class PPOState(TrainingState):
     normalizer: Normalizer
     episodes: EpisodeStates
     failed: FailedScenarios
+    scenarios: int
 
 
 LEARNER = shipped_learner(

@@ -10,8 +10,12 @@ from kinarm.policies.ppo import EpisodeStates, PPOConfig, PPOState
 from kinarm.policies.ppo.kernels.layers import Numbers
 from kinarm.policies.ppo.kernels.update import Experience, choose
 from kinarm.policies.ppo.networks import ActorCritic
+from kinarm.randomness import Stream, stream_generator
 
 Reals = NDArray[np.floating]
+
+LOT = 2048
+"""Scenarios that are drawn together: a few at a time would take up to thrice as long."""
 
 
 class TrainingArms:
@@ -26,6 +30,8 @@ class TrainingArms:
         What may be replayed.
     replayed : ndarray of bool, shape (n_envs,)
         Which arms replay it, with the noise of replays.
+    scenarios : int
+        Scenarios taken so far, but for replays.
     returns, successes : list of ndarray
         Of episodes that ended since `restore`, but for replays.
     cut_short, finals : list of ndarray
@@ -35,7 +41,8 @@ class TrainingArms:
     """
 
     def __init__(self, config: PPOConfig) -> None:
-        self.config = config
+        self.config, self.scenarios = config, 0
+        self._lot: tuple[int, StartsAndGoals] | None = None
         self.simulator = config.simulator(threads=1)
         self.mirror = problem_mirror(config.problem) if config.symmetric else None
 
@@ -44,9 +51,24 @@ class TrainingArms:
         drawn = self.simulator.sample(rng, count)
         return drawn if self.mirror is None else self.mirror.scenarios_from_the_right(*drawn)
 
+    def next_scenarios(self, count: int) -> StartsAndGoals:
+        """Take the next ones of the training, at least one; see `LOT`."""
+        first, self.scenarios = self.scenarios, self.scenarios + count
+        lots = [self._drawn(number) for number in range(first // LOT, -(-self.scenarios // LOT))]
+        starts, goals = (np.concatenate(part) for part in zip(*lots, strict=True))
+        within = slice(first % LOT, first % LOT + count)
+        return starts[within], goals[within]
+
+    def _drawn(self, number: int) -> StartsAndGoals:
+        """Draw a lot with random numbers of its own, unless it is the last one."""
+        if self._lot is None or self._lot[0] != number:
+            rng = stream_generator(Stream.PPO_SCENARIOS, self.config.seed, number)
+            self._lot = number, self.sample(rng, LOT)
+        return self._lot[1]
+
     def restore(self, state: PPOState, rng: np.random.Generator) -> None:
-        """Go on with a state's episodes; the generator draws later ones."""
-        self._rng = rng
+        """Go on with a state's episodes; the generator decides what is replayed."""
+        self._rng, self.scenarios = rng, state.scenarios
         self._mean, self._scale = state.normalizer.mean, input_scale(state.normalizer.std)
         begun = EpisodeStates._make(map(np.copy, state.episodes))
         scenarios, start, taken = (begun.q, begun.goal), begun.start, begun.steps
@@ -116,7 +138,7 @@ class TrainingArms:
             self.failed = self.failed.followed_by(*scenarios, config.replay_size)
 
         def draw(places: NDArray[np.int64]) -> StartsAndGoals:
-            return self.sample(self._rng, len(places))
+            return self.next_scenarios(len(places))
 
         scenarios, self.replayed[rows] = self.failed.mixed(
             config.replay_share, self._rng, len(rows), draw

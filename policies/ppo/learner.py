@@ -37,13 +37,9 @@ PARTS = 8
 """Parts of a minibatch whose gradients are found independently."""
 
 
-def seed_iteration(seed: int, iteration: int) -> tuple[np.random.Generator, np.random.Generator]:
-    """Give an iteration random numbers of its own, so that trainings can resume.
-
-    One generator is for the learner, one for scenarios.
-    """
-    learner = stream_generator(Stream.PPO_LEARNER, seed, iteration)
-    return learner, stream_generator(Stream.PPO_SCENARIOS, seed, iteration)
+def iteration_generator(seed: int, iteration: int) -> np.random.Generator:
+    """Random numbers of an iteration, so that trainings can resume."""
+    return stream_generator(Stream.PPO_LEARNER, seed, iteration)
 
 
 class PPOTraining:
@@ -64,9 +60,9 @@ class PPOTraining:
     def initial_state(self) -> PPOState:
         """State before the first iteration; the normaliser has seen random starts."""
         config, arms = self.config, self.arms
-        rng, scenarios = seed_iteration(config.seed, 0)
-        seen = self._seen(scenarios)
-        starts, goals = arms.sample(scenarios, config.n_envs)
+        rng, arms.scenarios = iteration_generator(config.seed, 0), 0
+        seen = self._seen(rng)
+        starts, goals = arms.next_scenarios(config.n_envs)
         parameters = initial_parameters(rng, self._widths, config.log_std_init)
         normalizer = Normalizer.of(seen)
         if config.initial_policy is not None:
@@ -82,6 +78,7 @@ class PPOTraining:
             normalizer=normalizer,
             episodes=EpisodeStates.begun(starts, goals),
             failed=FailedScenarios.none(starts.shape[1], goals.shape[1]),
+            scenarios=arms.scenarios,
         )
 
     def _seen(self, rng: np.random.Generator) -> NDArray[np.float64]:
@@ -104,12 +101,12 @@ class PPOTraining:
                 f"the state to resume has {sizes[0]} parameters and {sizes[1]} arms, "
                 f"not {expected[0]} and {expected[1]}"
             )
-        rng, scenarios = seed_iteration(config.seed, state.iteration + 1)
+        rng = iteration_generator(config.seed, state.iteration + 1)
         networks.load(state.parameters)
         log_std = config.log_std_at(state.iteration / config.iterations)
         if log_std is not None:
             networks.log_std[:] = log_std
-        arms.restore(state, scenarios)
+        arms.restore(state, rng)
         experience = collect(networks, arms, rng, threads=self.threads)
         moments = networks.scattered(state.first_moment), networks.scattered(state.second_moment)
         update(config, state.iteration, networks, moments, experience, rng, self.threads)
@@ -134,6 +131,7 @@ class PPOTraining:
             normalizer=state.normalizer,
             episodes=arms.states(),
             failed=arms.failed,
+            scenarios=arms.scenarios,
             curve=(*state.curve, point),
         )
 

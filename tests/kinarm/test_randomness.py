@@ -30,14 +30,6 @@ def test_no_two_purposes_share_numbers(draw):
     assert len(first) == len(generators)
 
 
-def test_an_iteration_of_ppo_shares_nothing_with_the_trial_of_its_number():
-    from kinarm.policies.ppo.learner import seed_iteration
-
-    for iteration in range(5):
-        ours = {generator.random() for generator in seed_iteration(0, iteration)}
-        assert not ours & {trial_generator(0, iteration, stream).random() for stream in (0, 1)}
-
-
 def test_a_training_of_ars_begins_with_its_stream():
     config = recipe("ars", "paper", problem="right", seed=5)
     begun = stream_generator(Stream.ARS, 5).bit_generator.state

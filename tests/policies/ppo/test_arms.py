@@ -12,6 +12,7 @@ from kinarm.policies import Normalizer, PPOConfig, PPOState
 from kinarm.policies.ppo import EpisodeStates
 from kinarm.policies.ppo.arms import TrainingArms
 from kinarm.problem import PROBLEMS
+from kinarm.randomness import Stream, stream_generator
 from kinarm.simulator import Simulator
 from kinarm.task import RewardWeights
 
@@ -50,6 +51,7 @@ def begun(normalizer):
             normalizer=normalizer,
             episodes=EpisodeStates.begun(*arms.sample(rng, arms.config.n_envs)),
             failed=FailedScenarios.none(6),
+            scenarios=0,
         )
         arms.restore(state, rng)
         return arms, state
@@ -59,7 +61,23 @@ def begun(normalizer):
 
 def go_on(arms, state):
     """The state in which the arms are now."""
-    return replace(state, episodes=arms.states(), failed=arms.failed)
+    return replace(state, episodes=arms.states(), failed=arms.failed, scenarios=arms.scenarios)
+
+
+def test_scenarios_come_from_lots_wherever_a_training_goes_on(begun, monkeypatch):
+    monkeypatch.setattr("kinarm.policies.ppo.arms.LOT", 10)
+    arms, state = begun()
+    taken = [arms.next_scenarios(count) for count in (3, 10, 25, 2)]
+    drawn = [
+        arms.simulator.sample(stream_generator(Stream.PPO_SCENARIOS, 0, lot), 10)
+        for lot in range(4)
+    ]
+    for part, expected in zip(zip(*taken, strict=True), zip(*drawn, strict=True), strict=True):
+        np.testing.assert_array_equal(np.concatenate(part), np.concatenate(expected))
+    again = made()
+    again.restore(replace(state, scenarios=13), np.random.default_rng(0))
+    for part, expected in zip(again.next_scenarios(25), taken[2], strict=True):
+        np.testing.assert_array_equal(part, expected)
 
 
 def test_random_bodies_stay_where_a_training_goes_on(begun):
@@ -178,7 +196,7 @@ class TestReplay:
 
     @pytest.fixture
     def arms(self, begun):
-        return begun(11, number=40, replay_share=0.5, replay_size=self.SIZE)[0]
+        return begun(11, number=40, horizon=20, replay_share=0.5, replay_size=self.SIZE)[0]
 
     def play(self, arms, steps):
         """Of all episodes that end: whether they are replays and reach the goal; scenarios."""

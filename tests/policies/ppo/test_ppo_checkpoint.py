@@ -34,6 +34,7 @@ def state():
             replayed=np.array([False, True, False]),
         ),
         failed=FailedScenarios(rng.normal(size=(4, 6)), rng.normal(size=(4, 3))),
+        scenarios=5000,
         curve=(
             CurvePoint(float("nan"), float("nan"), float("nan"), 12, 0.5),
             CurvePoint(0.25, 0.5, 0.125, 24, 0.75),
@@ -57,7 +58,7 @@ def test_round_trip(saved, state):
     parts = zip((*loaded.episodes, *loaded.failed), (*state.episodes, *state.failed), strict=True)
     for first, second in parts:
         assert (first.dtype, first.tobytes()) == (second.dtype, second.tobytes())
-    assert loaded.normalizer.count == 1000
+    assert (loaded.normalizer.count, loaded.scenarios) == (1000, 5000)
     assert loaded.normalizer.mean.tobytes() == state.normalizer.mean.tobytes()
     assert loaded.normalizer.squares.tobytes() == state.normalizer.squares.tobytes()
     np.testing.assert_array_equal(loaded.curve, state.curve)
