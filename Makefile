@@ -9,7 +9,7 @@ PIP_INSTALL := $(BIN)/python -m pip install --quiet --disable-pip-version-check 
 MODULES := $(shell find kinarm policies evaluation data -name __pycache__ -prune -o -type f -print | sort | cksum | cut -d' ' -f1)
 INSTALLED = $(VENV)/.installed-$(1)-$(MODULES)
 
-.PHONY: eval test test-slow test-rare campaign mutants lint docs package aarch64 clean
+.PHONY: eval test test-slow test-rare coverage campaign mutants lint docs package aarch64 clean
 
 eval: $(call INSTALLED,core) ## evaluate what ships for the three tasks on 200 trials each
 	$(BIN)/kinarm-eval --trials 200
@@ -17,15 +17,19 @@ eval: $(call INSTALLED,core) ## evaluate what ships for the three tasks on 200 t
 PYTEST := $(BIN)/python -m pytest --dist loadfile --no-loadscope-reorder --durations=25
 
 WORKERS ?= auto
+QUICK := "not slow and not rare"
 
 test: $(call INSTALLED,test) ## run the tests, but for the slow ones
-	$(PYTEST) -n $(WORKERS) -m "not slow and not rare" --cov --cov-report=term --cov-fail-under=90
+	$(PYTEST) -n $(WORKERS) -m $(QUICK)
 
 test-slow: $(call INSTALLED,all) ## run the slow tests, and what make test skipped for want of a library
 	$(PYTEST) -n $(WORKERS) -m "not rare" --rest
 
 test-rare: $(call INSTALLED,all) ## run the tests that CI leaves out
 	$(PYTEST) -n $(WORKERS) -m rare
+
+coverage: $(call INSTALLED,all) ## see which lines make test runs with all extras: half as long again
+	$(PYTEST) -n $(WORKERS) -m $(QUICK) --cov --cov-report=term --cov-fail-under=90
 
 CAMPAIGN := loaders disturbances
 

@@ -115,13 +115,6 @@ def pytest_configure(config: pytest.Config) -> None:
         config.pluginmanager.register(Skipped(config))
 
 
-UNTRACED = {"frozen", "golden", "kernels"}
-"""Folders of tests that repeat at length what others cover, as slow tests do.
-
-Tracing takes half as long again.
-"""
-
-
 @pytest.hookimpl(trylast=True)
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
     """Begin with the files that take long, so that no worker ends alone with one of them."""
@@ -133,11 +126,6 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
         items[:] = [item for item in items if item in left]
     files = {item.path for item in slow}
     items.sort(key=lambda item: item.path not in files)
-    if config.pluginmanager.hasplugin("_cov"):
-        for item in items:
-            folders = item.path.relative_to(Path(__file__).parent).parts
-            if item in slow or not UNTRACED.isdisjoint(folders):
-                item.add_marker("no_cover")
 
 
 @pytest.fixture(scope="session", autouse=True)
