@@ -1,6 +1,6 @@
-"""Experiments come to the figures that version 1.0.0 recorded of them, to the last bit.
+"""Experiments come to the figures that were recorded of them, to the last bit.
 
-Intervals are of a later kind.
+Those of ARS are of version 1.0.0; intervals are of a later kind.
 """
 
 import csv
@@ -23,7 +23,7 @@ def rows_of(name):
 
 
 def test_the_runs_of_a_study(tmp_path):
-    """With the keys of its files; those of ARS are of version 1.0.0, so that its folders go on."""
+    """With the keys of its files, by which folders go on."""
     study = Study(FROZEN / "study.toml", tmp_path).run()
     rows = study.rows()
     expected = rows_of("runs.csv")
