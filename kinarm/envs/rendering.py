@@ -15,7 +15,7 @@ from kinarm.viewer.camera import Camera
 
 if TYPE_CHECKING:
     from kinarm.collision import Contact
-    from kinarm.viewer.live_server import LiveStage
+    from kinarm.viewer.live_stage import LiveStage
     from kinarm.viewer.renderer import Renderer
 
 Picture = NDArray[np.uint8]
@@ -117,7 +117,7 @@ class EnvPictures:
     def close(self) -> None:
         """End the live page."""
         if self._stage is not None:
-            self._stage.server.close()
+            self._stage.close()
         self._stage, self._renderers = None, {}
 
     def render(self) -> tuple[Picture, ...] | None:
@@ -150,11 +150,10 @@ class EnvPictures:
 
     def _live_stage(self) -> "LiveStage":
         if self._stage is None:
-            from kinarm.viewer.live_server import LiveServer, LiveStage
+            from kinarm.viewer.live_stage import LiveStage
 
-            server = LiveServer()
-            self._stage = LiveStage(server, self._simulator.problem, self._simulator.arm)
-            webbrowser.open(server.address)
+            self._stage = LiveStage(self._simulator.problem, self._simulator.arm)
+            webbrowser.open(self._stage.address)
         return self._stage
 
     def _way(self, row: int) -> tuple[NDArray[np.float64], str | None]:

@@ -1,7 +1,6 @@
 """Draw an arm and its scene into a Meshcat window, for pages and live."""
 
 import struct
-import threading
 from collections import defaultdict
 from collections.abc import Mapping
 from dataclasses import replace
@@ -55,44 +54,20 @@ FIELD_OF_VIEW, CAMERA_PLACE = 32, (-2.4, 1.6, 1.9)
 
 
 class DrawnScene:
-    """The drawing commands that still count; any thread may add some.
-
-    A command replaces an earlier one for the same part of a node: the scene grows with what is
-    seen, not with time. The same drawing on its ``window`` gives the same bytes.
-    """
+    """The commands that draw a scene on a ``window``; the same drawing gives the same bytes."""
 
     def __init__(self) -> None:
-        self.window, self.ids = Visualizer(window=self), count()
-        self._commands: dict[tuple[str, str, str], tuple[int, bytes]] = {}
-        self._last, self._lock = 0, threading.Lock()
+        self.window, self.ids, self._told = Visualizer(window=self), count(), list[bytes]()
 
     def send(self, command: Any) -> None:
-        """Take a command; Meshcat calls this."""
-        self.add(command.lower())
-
-    def add(self, command: Mapping[str, Any]) -> None:
-        """Take a command and put its length before it."""
-        path, kind, packed = command["path"], command["type"], umsgpack.packb(command)
-        key = (path, kind, command.get("property", ""))
-        below = f"{path.rstrip('/')}/"
-        with self._lock:
-            for other in [*self._commands] if kind == "delete" else ():
-                if other[0] == path or other[0].startswith(below):
-                    del self._commands[other]
-            self._commands.pop(key, None)  # so that the latest commands come last
-            self._last += 1
-            self._commands[key] = self._last, struct.pack("<I", len(packed)) + packed
+        """Add a command behind its length; Meshcat calls this."""
+        packed = umsgpack.packb(command.lower())
+        self._told.append(struct.pack("<I", len(packed)) + packed)
 
     @property
     def content(self) -> bytes:
-        """All commands that count."""
-        return b"".join(told for _, told in self._commands.values())
-
-    def news(self, since: int) -> bytes:
-        """How many commands there were, and those that count of what came after so many."""
-        with self._lock:
-            told = [told for number, told in self._commands.values() if number > since]
-            return struct.pack("<I", self._last) + b"".join(told)
+        """All commands."""
+        return b"".join(self._told)
 
 
 class _Described(geometry.Object):
