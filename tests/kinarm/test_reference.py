@@ -193,4 +193,4 @@ def test_shipped_policies(name):
     """One of PPO, and one of ARS, which has a mirror."""
     simulator = simulator_of("both")
     ends = compare_networks(simulator, trained_networks(name, 10, 17), 18, 60, atol=1e-9)
-    assert (ends > 5).all()
+    assert (ends > 2).all()

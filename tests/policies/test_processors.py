@@ -19,6 +19,7 @@ PLAIN_LIBRARIES = {
 """What makes libraries believe to run on a machine of 2004."""
 
 
+@pytest.mark.slow
 def test_libraries_for_a_plain_processor_give_the_same_bits():
     assert computed_bits(PLAIN_LIBRARIES) == usual_bits()
 

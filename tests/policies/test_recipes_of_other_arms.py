@@ -79,7 +79,7 @@ def test_progress_counts_in_the_arms_reach(half_right):
 
 
 def test_ppo_learns_the_same_in_a_world_of_half_the_size(half_right):
-    small = {"iterations": 12, "n_epochs": 2, "seed": 1, "residual": False}
+    small = {"iterations": 12, "n_epochs": 2, "seed": 2, "residual": False}
     half = train_policy(recipe("ppo", "quick", problem=half_right, **small))
     whole = train_policy(recipe("ppo", "quick", problem="right", **small))
     for ours, theirs in zip(half.curve, whole.curve, strict=True):
