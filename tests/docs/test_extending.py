@@ -90,6 +90,7 @@ TOYS = {
 }
 
 
+@pytest.mark.slow
 def test_experiments_train_it_in_other_processes_and_a_column_stands_in_one_place(
     toy: None, folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -107,6 +108,7 @@ def test_experiments_train_it_in_other_processes_and_a_column_stands_in_one_plac
         assert shown in text
 
 
+@pytest.mark.slow
 def test_a_registered_learner_resumes_exactly(
     toy: None, folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -39,7 +39,10 @@ def test_an_evaluation(evaluation):
     check(evaluation)
 
 
-@pytest.mark.parametrize("name", ["right", "pose-ur5", "obstacles-ur5", "hard-paper"])
+@pytest.mark.parametrize(
+    "name",
+    ["right", "pose-ur5", "obstacles-ur5", pytest.param("hard-paper", marks=pytest.mark.slow)],
+)
 def test_an_evaluation_of_other_kinds_of_problems(name):
     problem = ReachProblem.load(name)
     if problem.arm.name not in ("paper", "paper_flange") and not is_installed():

@@ -37,7 +37,10 @@ PROBLEMS = {
 }
 
 
-@pytest.mark.parametrize("name", PROBLEMS)
+@pytest.mark.parametrize(
+    "name",
+    [pytest.param(name, marks=pytest.mark.slow) if name == "plant" else name for name in PROBLEMS],
+)
 def test_results_depend_on_the_episode_alone(name):
     one, two = (Simulator(PROBLEMS[name], threads=threads) for threads in (1, 2))
     rng = np.random.default_rng(5)

@@ -24,6 +24,9 @@ KINDS = {
     "configuration": {"kind": "configuration"},
 }
 
+COMPILED = ("position", "configuration")
+"""Kinds for which kernels behind a plant are compiled that nothing else needs."""
+
 MOTION = {"velocity": [0.0, 0.05, 0.0]}
 
 WAYS = {
@@ -84,7 +87,10 @@ def test_the_reference_agrees(goal):
     compare_with_reference(simulator_of(goal))
 
 
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize(
+    "kind",
+    ["direction", "pose", *(pytest.param(each, marks=pytest.mark.slow) for each in COMPILED)],
+)
 def test_the_reference_agrees_with_a_plant(kind):
     # Policies see what is measured, and are judged by what is.
     shown = [*Observation().names(kind), "resolved_rate"]

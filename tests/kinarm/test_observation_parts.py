@@ -86,6 +86,7 @@ class TestReference:
         settings = {"scene": SCENES[scene], "arm": arm, "horizon": 12}
         self.compare(simulator_of(history=3, obstacle_slots=5, **settings))
 
+    @pytest.mark.slow
     @pytest.mark.parametrize("feedback", ["measured", "commanded"])
     def test_agrees_behind_a_plant(self, feedback):
         plant = replace(Plant.load("hard"), feedback=feedback)

