@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from kinarm import Arm
 from kinarm._files import save_archive
+from kinarm.viewer import meshes
 from kinarm.viewer.meshes import SEGMENTS, Mesh, box, capsule, loft
 from kinarm.viewer.visual_shapes import LOOKS
 
@@ -23,14 +24,14 @@ ARMS = Path(__file__).parents[1] / "data" / "arms"
 NAMES = ("lrmate200ic_5l", "paper", "paper_flange")
 
 
+COORDINATES = {"x": (2, 0, 1), "y": (1, 2, 0), "z": (0, 1, 2)}
+"""Which coordinates of what stands along z come first to last along an axis."""
+
+
 def lathe(profile: Sequence[tuple[float, float]], axis: str = "z") -> Mesh:
     """Turn a profile of positions and radii [m] about an axis."""
-    angle = np.linspace(0, 2 * np.pi, SEGMENTS, endpoint=False)
-    position, radius = np.array(profile, dtype=float).T
-    across = radius[:, None] * np.cos(angle), radius[:, None] * np.sin(angle)
-    along = np.repeat(position[:, None], SEGMENTS, axis=1)
-    order = {"z": (*across, along), "x": (along, *across), "y": (across[1], along, across[0])}
-    return loft(np.stack(order[axis], axis=2))
+    upright = meshes.lathe(profile)
+    return Mesh(upright.vertices[:, COORDINATES[axis]], upright.faces)
 
 
 def cylinder(length: float, radius: float, chamfer: float, axis: str = "z") -> Mesh:
@@ -84,9 +85,9 @@ def parts(arm: Arm) -> Iterator[tuple[int, str, Mesh]]:
 
 def looks(arm: Arm) -> tuple[dict[str, NDArray[Any]], dict[str, Any]]:
     """Arrays and header of an arm's file."""
-    joints, finishes, meshes = zip(*parts(arm), strict=True)
+    joints, finishes, shapes = zip(*parts(arm), strict=True)
     arrays = {"joints": np.array(joints), "finishes": np.array(finishes)}
-    for number, mesh in enumerate(meshes):
+    for number, mesh in enumerate(shapes):
         arrays |= {f"vertices {number}": mesh.vertices, f"faces {number}": mesh.faces}
     return arrays, {"names": [*arm.joint_names], "tool": arm.chain.tool.tolist()}
 

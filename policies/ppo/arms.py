@@ -54,10 +54,12 @@ class TrainingArms:
     def next_scenarios(self, count: int) -> StartsAndGoals:
         """Take the next ones of the training, at least one; see `LOT`."""
         first, self.scenarios = self.scenarios, self.scenarios + count
-        lots = [self._drawn(number) for number in range(first // LOT, -(-self.scenarios // LOT))]
-        starts, goals = (np.concatenate(part) for part in zip(*lots, strict=True))
-        within = slice(first % LOT, first % LOT + count)
-        return starts[within], goals[within]
+        parts = []
+        for number in range(first // LOT, -(-self.scenarios // LOT)):
+            within = slice(max(first - number * LOT, 0), self.scenarios - number * LOT)
+            parts.append([each[within] for each in self._drawn(number)])
+        starts, goals = (np.concatenate(part) for part in zip(*parts, strict=True))
+        return starts, goals
 
     def _drawn(self, number: int) -> StartsAndGoals:
         """Draw a lot with random numbers of its own, unless it is the last one."""

@@ -37,11 +37,6 @@ PARTS = 8
 """Parts of a minibatch whose gradients are found independently."""
 
 
-def iteration_generator(seed: int, iteration: int) -> np.random.Generator:
-    """Random numbers of an iteration, so that trainings can resume."""
-    return stream_generator(Stream.PPO_LEARNER, seed, iteration)
-
-
 class PPOTraining:
     """A training under way; all that changes is in the `PPOState`.
 
@@ -60,7 +55,7 @@ class PPOTraining:
     def initial_state(self) -> PPOState:
         """State before the first iteration; the normaliser has seen random starts."""
         config, arms = self.config, self.arms
-        rng, arms.scenarios = iteration_generator(config.seed, 0), 0
+        rng, arms.scenarios = stream_generator(Stream.PPO_LEARNER, config.seed, 0), 0
         seen = self._seen(rng)
         starts, goals = arms.next_scenarios(config.n_envs)
         parameters = initial_parameters(rng, self._widths, config.log_std_init)
@@ -101,7 +96,7 @@ class PPOTraining:
                 f"the state to resume has {sizes[0]} parameters and {sizes[1]} arms, "
                 f"not {expected[0]} and {expected[1]}"
             )
-        rng = iteration_generator(config.seed, state.iteration + 1)
+        rng = stream_generator(Stream.PPO_LEARNER, config.seed, state.iteration + 1)
         networks.load(state.parameters)
         log_std = config.log_std_at(state.iteration / config.iterations)
         if log_std is not None:
