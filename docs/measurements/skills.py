@@ -1,6 +1,6 @@
 """What one recipe learns: ``python -m docs.measurements.skills FOLDER`` judges its trainings.
 
-FOLDER is that of ``kinarm-study skills --out FOLDER``. Its policies face trials that nothing else
+FOLDER is that of ``kinarm-study policies --out FOLDER``. Its policies face trials that nothing else
 draws, bare and behind a shield; ``data/results/skills/skills.json`` keeps what they reach, beside
 the rows of other problems, and `docs.tables` makes a table of it.
 """
@@ -23,6 +23,9 @@ from kinarm.evaluation.trials import TrialSet
 from kinarm.policies import Policy
 
 RECORD = Path(__file__).parents[2] / "data" / "results" / "skills" / "skills.json"
+
+JUDGED = ("ppo-best-disturbed", "ppo-best-arms", "ppo-best-poses")
+"""Entries of the experiment beyond the paper's world."""
 
 TRIALS, SEED = 10_000, 3602
 """Trials of each problem: nothing else draws from this seed."""
@@ -72,11 +75,15 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
     parser.add_argument("folder", type=Path, help="folder of the study")
     study = Study.load(parser.parse_args().folder)
-    order, rows = Experiment.load("skills").problems, list[dict[str, Any]]()
+    entries = {entry.name: entry.problems for entry in Experiment.load("policies").entries}
+    order = [name for key in JUDGED for name in entries[key]]
+    rows = list[dict[str, Any]]()
     if RECORD.exists():
         rows = json.loads(RECORD.read_text(encoding="utf-8"))["rows"]
     for group in study.groups():
         name = group.config.problem.name
+        if group.entry.name not in JUDGED:
+            continue
         runs = [run for run in study.finished if run.config.problem.name == name]
         policies = {f"ppo-best-{name}-seed{run.config.seed}.npz": study.policy(run) for run in runs}
         found = judged(policies)
