@@ -134,7 +134,10 @@ class TestPlayground:
             (("nobody",), "unknown policy 'nobody'"),
             ((PLAYED[0], "--compare", "zero", "zero"), "--compare does not go with --play"),
             ((PLAYED[0], "--wrapper", "a:b"), "--wrapper does not go with --play"),
-            ((PLAYED[0], "--plant", "hard"), "it has a plant with more than one delay"),
+            pytest.param(
+                *((PLAYED[0], "--plant", "hard"), "it has a plant with more than one delay"),
+                marks=pytest.mark.slow,
+            ),
             ((PLAYED[0], "--arm", "paper_flange"), "was trained for arm 'paper', not for"),
         ],
     )

@@ -77,7 +77,10 @@ def test_policies_of_the_example_are_of_the_recipe_without_its_mirror(problem):
     assert len(paths) == 4
 
 
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize(
+    "name",
+    [pytest.param(name, marks=[pytest.mark.slow] if "hard" in name else []) for name in NAMES],
+)
 def test_a_policy_is_what_the_released_recipe_makes_in_a_whole_training(name):
     policy = load_policy(name)
     (algorithm, named, *words, seed), made = name.split("-"), policy.provenance

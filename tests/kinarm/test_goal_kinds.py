@@ -24,9 +24,6 @@ KINDS = {
     "configuration": {"kind": "configuration"},
 }
 
-COMPILED = ("position", "configuration")
-"""Kinds for which kernels behind a plant are compiled that nothing else needs."""
-
 MOTION = {"velocity": [0.0, 0.05, 0.0]}
 
 WAYS = {
@@ -87,11 +84,10 @@ def test_the_reference_agrees(goal):
     compare_with_reference(simulator_of(goal))
 
 
-@pytest.mark.parametrize(
-    "kind",
-    ["direction", "pose", *(pytest.param(each, marks=pytest.mark.slow) for each in COMPILED)],
-)
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", KINDS)
 def test_the_reference_agrees_with_a_plant(kind):
+    """Kernels are compiled for each kind that nothing else needs."""
     # Policies see what is measured, and are judged by what is.
     shown = [*Observation().names(kind), "resolved_rate"]
     settings = {"plant": "ur", "tolerance": 0.1, "observation": shown}

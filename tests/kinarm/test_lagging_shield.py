@@ -111,6 +111,7 @@ def test_joints_settle_as_far_as_is_claimed(simulator):
     assert tried == 40
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("plant", ["ideal", Plant(bandwidth=20.0)])
 def test_arms_stay_away_from_bodies_that_move(plant):
     simulator = Simulator(among("right", swinging(0.35)), threads=1).with_plant(plant)

@@ -42,7 +42,7 @@ SCENES = {
     "random": Scene(random_bodies=(FALLING,)),
 }
 
-HARD = "benches", "hard"
+HARD = pytest.param("benches", "hard", marks=pytest.mark.slow)
 
 
 def test_parts_that_need_no_table_are_in_it():

@@ -117,14 +117,12 @@ def test_memory(observation, plant, tmp_path):
     check_episodes(tmp_path / "out", policy)
 
 
-@pytest.mark.parametrize(
-    "kind",
-    [
-        *("position", "pose"),
-        pytest.param("direction", marks=pytest.mark.slow),
-        pytest.param("configuration", marks=pytest.mark.slow),
-    ],
-)
+SLOW = [
+    pytest.param(name, marks=pytest.mark.slow) for name in ("direction", "pose", "configuration")
+]
+
+
+@pytest.mark.parametrize("kind", ["position", *SLOW])
 def test_kinds_of_goals(kind, tmp_path):
     """Policies add to resolved rates of each."""
     shown = (*Observation().names(kind), "resolved_rate")
@@ -134,6 +132,7 @@ def test_kinds_of_goals(kind, tmp_path):
     check_one_step(tmp_path / "out", policy, 2000)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("plant", PLANTS)
 def test_rates_start_from_commands(plant, tmp_path):
     shown = (*Observation().names("position"), "resolved_rate")
@@ -373,6 +372,7 @@ class TestONNX:
         )
         self.check(policy_for(problem, activation="elu"), tmp_path / "out")
 
+    @pytest.mark.slow
     def test_poses(self, tmp_path):
         shown = (*Observation().names("pose"), "resolved_rate")
         problem = ReachProblem.load("both").replace(goal={"kind": "pose"}, observation=shown)
