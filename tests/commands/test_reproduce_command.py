@@ -41,7 +41,7 @@ class TestQuick:
         assert "Traceback" not in answer.err
 
     def test_figures_are_those_of_the_release(self, quick):
-        """They lie in ``tests/frozen``; those of ARS are of version 1.0.0."""
+        """They lie in ``tests/frozen``."""
         folder, _ = quick
         frozen = (json.loads((each / "claims.json").read_text()) for each in (FROZEN, folder))
         expected, found = (document["readings"] for document in frozen)
