@@ -8,69 +8,27 @@ their commands; `docs.tables` makes a table of it.
 
 import argparse
 import json
-import tempfile
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from docs.measurements.plants import ServoArm
+from docs.measurements.plants import Manner, ServoArms, draw_lags, run
 from docs.measurements.skills import RECORD, SEED
 from kinarm import Plant, Simulator
 from kinarm._files import write_text
 from kinarm.evaluation import find_contestants
-from kinarm.evaluation.contestants import NEVER
-from kinarm.policies import Policy, export_policy
-from kinarm.policies.arm_policy import ArmPolicy
+from kinarm.policies import Policy
 
 PROBLEM = "hard-paper"
 
 
-def drive(policy: Policy, trials: int, *, shielded: bool) -> dict[str, float]:
+def drive(policy: Policy, trials: int, manner: Manner) -> dict[str, float]:
     """Shares of trials that succeed and touch, each on an arm of its own."""
-    hard = Simulator(PROBLEM, threads=1)
-    plant, ideal, task = hard.problem.plant, hard.with_plant(Plant()), hard.task
-    rng, n, seconds = np.random.default_rng(SEED), hard.n_actions, hard.problem.stepping.time_step
-    starts, goals = ideal.sample(rng, trials)
-    drawn = {
-        each: rng.uniform(*plant.range_of(each), trials) for each in ("bandwidth", "acceleration")
-    }
-    lowest, highest = (int(each) for each in plant.range_of("delay"))
-    delays = rng.integers(lowest, highest + 1, trials)
-    arms = []
-    for row, start in enumerate(starts):
-        lag = Plant(**{each: float(values[row]) for each, values in drawn.items()})
-        arms.append(ServoArm(ideal.with_plant(lag), 1))
-        arms[-1].begin(start[None])
-    with tempfile.TemporaryDirectory() as folder:
-        export_policy(policy, Path(folder) / "arm", onnx=False)
-        runtime = ArmPolicy(Path(folder) / "arm", feedback="measured")
-    shield = ideal.with_tolerance(NEVER).shielded()
-    told, commands, q = shield.reset(starts, goals), [starts], starts.copy()
-    success, contact = np.zeros(trials, dtype=bool), np.zeros(trials, dtype=bool)
-    tools = ideal.world.poses(q)[:, :3, 3]
-    for _ in range(task.horizon):
-        seen, aims = q.copy(), goals.copy()
-        seen[:, :n] += plant.range_of("noise")[0] * rng.normal(size=(trials, n))
-        aims += plant.range_of("goal_noise")[0] * rng.normal(size=goals.shape)
-        command = runtime.command(seen, aims)
-        if shielded:
-            shield.step(told, (command - commands[-1])[:, :n] / hard.step_limit)
-            command = runtime.commanded = told.q.copy()
-        commands.append(command)
-        running, before = ~(success | contact), tools
-        for row in np.flatnonzero(running):
-            late = commands[max(0, len(commands) - 1 - delays[row])][row, :n]
-            (way,) = arms[row].move(late[None], running[row : row + 1])
-            visited = np.repeat(q[row : row + 1], len(way), axis=0)
-            visited[:, :n] = way
-            contact[row] = ideal.world.in_contact(visited).any()
-            q[row, :n] = way[-1]
-        tools = ideal.world.poses(q)[:, :3, 3]
-        near = ideal.world.distances(q, goals) <= task.tolerance
-        slow = np.linalg.norm(tools - before, axis=1) <= task.goal.speed * seconds
-        success |= running & ~contact & near & slow
-    return {"success": float(success.mean()), "contact": float(contact.mean())}
+    simulator, rng = Simulator(PROBLEM, threads=1), np.random.default_rng(SEED)
+    starts, goals = simulator.with_plant(Plant()).sample(rng, trials)
+    arms = ServoArms(simulator, draw_lags(simulator.problem.plant, trials, rng))
+    ended = run(arms, policy, starts, goals, manner, rng)
+    return {name: float(ended[name].mean()) for name in ("success", "contact")}
 
 
 def main() -> None:
@@ -81,10 +39,10 @@ def main() -> None:
     given = parser.parse_args()
     rows: list[dict[str, Any]] = []
     for each in find_contestants(given.policy):
-        for shielded in (False, True):
+        for manner in (Manner(), Manner(shield="commands")):
             assert each.policy is not None
-            found = drive(each.policy, given.trials, shielded=shielded)
-            rows.append({"policy": each.name, "shield": shielded, **found})
+            found = drive(each.policy, given.trials, manner)
+            rows.append({"policy": each.name, "shield": bool(manner.shield), **found})
             print(rows[-1], flush=True)
     record = {"trials": given.trials, "seed": SEED, "rows": rows}
     write_text(RECORD.with_name("mujoco.json"), json.dumps(record, indent=1) + "\n")

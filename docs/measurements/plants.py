@@ -11,18 +11,21 @@ import json
 import time
 from collections.abc import Mapping
 from dataclasses import replace
+from functools import cache, partial
 from itertools import product
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any, Literal, NamedTuple
 
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from kinarm import Plant, Simulator
+from kinarm import Plant, Simulator, World
 from kinarm.evaluation.contestants import NEVER
 from kinarm.kernels.plant import COMMAND
-from kinarm.policies import Policy, load_policy
+from kinarm.policies import Policy, export_policy, load_policy
+from kinarm.policies.arm_policy import ArmPolicy
 from kinarm.policies.running.mujoco_arm import SUBSTEP, servo_model
 
 Array = NDArray[np.float64]
@@ -94,34 +97,59 @@ FEWER = 0.1
 """Share of the trials in other cells."""
 
 
-class ServoArm:
+class Lags(NamedTuple):
+    """How arms lag, and what is seen of them.
+
+    Attributes
+    ----------
+    bandwidth, acceleration : ndarray, shape (n,)
+        Of each arm's servos [Hz], and largest acceleration, 0 for no limit [rad/s^2].
+    delay : ndarray of int, shape (n,)
+        Steps by which a command comes late.
+    noise, goal_noise : float
+        Standard deviations of each measurement of a joint [rad], and of a goal's coordinate [m].
+    """
+
+    bandwidth: Array
+    acceleration: Array
+    delay: NDArray[np.int64]
+    noise: float
+    goal_noise: float
+
+
+def draw_lags(plant: Plant, count: int, rng: np.random.Generator) -> Lags:
+    """Lags of so many arms, uniform in the ranges of a plant."""
+    bandwidth, acceleration = (
+        rng.uniform(*plant.range_of(name), count) for name in ("bandwidth", "acceleration")
+    )
+    least, most = plant.range_of("delay")
+    noises = (plant.range_of(name)[1] for name in ("noise", "goal_noise"))
+    return Lags(bandwidth, acceleration, rng.integers(int(least), int(most) + 1, count), *noises)
+
+
+class ServoArms:
     """Arms in MuJoCo on critically damped position servos, without gravity.
 
     Parameters
     ----------
     simulator : Simulator
-        Arm, scene and plant.
-    count : int
-        Number of arms.
+        Arm and scene.
+    lags : Lags
+        How each of them lags.
     """
 
-    def __init__(self, simulator: Simulator, count: int) -> None:
-        self.simulator, plant = simulator, simulator.problem.plant
-        model = servo_model(mujoco, simulator.world, plant.range_of("bandwidth")[0])
-        self.model, self.states = model, [mujoco.MjData(model) for _ in range(count)]
-        model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONSTRAINT
-        if plant.acceleration:
-            rate = 2 * np.pi * plant.range_of("bandwidth")[0]
-            moved = model.actuator_gainprm[:, 0] / rate**2
-            most = moved * plant.range_of("acceleration")[0]
-            model.actuator_forcelimited[:] = 1
-            model.actuator_forcerange[:] = np.stack([-most, most], axis=1)
+    def __init__(self, simulator: Simulator, lags: Lags) -> None:
+        self.simulator, self.lags = simulator, lags
+        model = cache(partial(_lagging_model, simulator.world))
+        pairs = zip(lags.bandwidth.tolist(), lags.acceleration.tolist(), strict=True)
+        self.models = [model(*pair) for pair in pairs]
+        self.states = [*map(mujoco.MjData, self.models)]
 
     def begin(self, starts: Array) -> None:
         """Let arms rest at configurations, shape (n, n_joints) [rad or m]."""
-        for state, start in zip(self.states, starts, strict=True):
-            mujoco.mj_resetData(self.model, state)
-            state.qpos[:] = start[: self.model.nq]
+        for model, state, start in zip(self.models, self.states, starts, strict=True):
+            mujoco.mj_resetData(model, state)
+            state.qpos[:] = start[: model.nq]
 
     def move(self, commands: Array, running: Array) -> Array:
         """Joint positions on the way, shape (n, parts, n_actions) [rad or m], for commands.
@@ -131,13 +159,14 @@ class ServoArm:
         """
         parts, time_step = 10, self.simulator.problem.stepping.time_step
         fastest = self.simulator.step_limit / time_step
-        limits = self.model.jnt_range.T
-        ways = np.empty((len(commands), parts, self.model.nq))
+        ways = np.empty((len(commands), parts, commands.shape[1]))
         for row, (way, state) in enumerate(zip(ways, self.states, strict=True)):
+            model = self.models[row]
+            limits = model.jnt_range.T
             way[:] = state.qpos
             state.ctrl[:] = commands[row]
             for part in range(parts if running[row] else 0):
-                mujoco.mj_step(self.model, state, round(time_step / SUBSTEP / parts))
+                mujoco.mj_step(model, state, round(time_step / SUBSTEP / parts))
                 speeds = np.clip(state.qvel, -fastest, fastest)
                 late = 0.5 * time_step / parts * (speeds - state.qvel)
                 within = np.clip(state.qpos + late, *limits)
@@ -148,71 +177,108 @@ class ServoArm:
         return ways
 
 
+def _lagging_model(world: World, bandwidth: float, acceleration: float) -> mujoco.MjModel:
+    """The arm on servos of a bandwidth [Hz], whose force ends at an acceleration [rad/s^2]."""
+    model = servo_model(mujoco, world, bandwidth)
+    model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONSTRAINT
+    if acceleration:
+        most = model.actuator_gainprm[:, 0] / (2 * np.pi * bandwidth) ** 2 * acceleration
+        model.actuator_forcelimited[:] = 1
+        model.actuator_forcerange[:] = np.stack([-most, most], axis=1)
+    return model
+
+
+class GivenActions:
+    """Commands of given actions, as `kinarm.policies.arm_policy.ArmPolicy` has those of a policy.
+
+    Parameters
+    ----------
+    simulator : Simulator
+        The arm.
+    starts, actions : ndarray, shape (n, n_joints) and (n, horizon, n_actions)
+        Where arms rest [rad or m], and what they do.
+    """
+
+    def __init__(self, simulator: Simulator, starts: Array, actions: Array) -> None:
+        self.commanded, self._actions = starts, iter(actions.swapaxes(0, 1))
+        self._step, self._limits = simulator.step_limit, (simulator.arm.lower, simulator.arm.upper)
+
+    def command(self, *_: Array) -> Array:
+        """Joint positions of the next step, shape (n, n_joints) [rad or m]."""
+        moved, action = self.commanded.copy(), next(self._actions)
+        moved[:, : len(self._step)] += action * self._step
+        self.commanded = np.clip(moved, *self._limits)
+        return self.commanded
+
+
+def exported(policy: Policy, feedback: str) -> ArmPolicy:
+    """What drives an arm by a policy, of measured or commanded joint positions."""
+    with TemporaryDirectory() as folder:
+        export_policy(policy, Path(folder) / "arm", onnx=False)
+        return ArmPolicy(Path(folder) / "arm", feedback=feedback)
+
+
 def run(
-    arm: ServoArm,
+    arms: ServoArms,
     policy: Policy | Array,
     starts: Array,
     goals: Array,
-    manner: Manner | None = None,
+    manner: Manner,
+    rng: np.random.Generator,
 ) -> dict[str, Array]:
-    """Drive arms by a policy, or by actions, shape (n, horizon, n_actions).
+    """Drive arms by a policy, or by actions, shape (n, horizon, n_actions), to the end.
 
     Returns which succeeded and touched, shape (n,), and the paths of actuated joints, shape (n,
-    horizon + 1, n_actions). Resolved rates are of commanded joints in every manner.
+    horizon + 1, n_actions). Arms that a policy drives rest once either is so.
     """
-    simulator, plant = arm.simulator, arm.simulator.problem.plant
-    watched = simulator.world
+    simulator, lags, trained = arms.simulator, arms.lags, isinstance(policy, Policy)
+    driver: ArmPolicy | GivenActions
     if isinstance(policy, Policy):
-        watched = simulator.seen_as(policy.observation).world
-    rates = watched.layout.places.get("resolved_rate")
-    manner = manner or Manner(plant.feedback)
-    n, n_actions = len(starts), simulator.n_actions
-    horizon = round(simulator.task.horizon / manner.speed)
-    world, rng = simulator.world, np.random.default_rng(0)
-    lower, upper = (each[:n_actions] for each in (simulator.arm.lower, simulator.arm.upper))
-    known = replace(plant, noise=0.0) if manner.shield == "joints" else Plant()
+        driver = exported(policy, manner.feedback)
+    else:
+        driver = GivenActions(simulator, starts, policy)
+    task, world, n = simulator.task, simulator.world, simulator.n_actions
+    stride = np.inf if task.goal.speed is None else task.goal.speed
+    stride *= simulator.problem.stepping.time_step
+    known = Plant()
+    if manner.shield == "joints":
+        known = replace(simulator.problem.plant, noise=0.0)
     shield = simulator.with_plant(known).with_tolerance(NEVER).shielded()
     told = shield.reset(starts, goals)
-    arm.begin(starts)
-    commands = [starts[:, :n_actions]]
-    paths = np.empty((n, horizon + 1, n_actions))
-    paths[:, 0] = starts[:, :n_actions]
-    success, contact = np.zeros(n, dtype=bool), np.zeros(n, dtype=bool)
-    for step in range(horizon):
-        seen = starts.copy()
-        seen[:, :n_actions] = commands[-1] if manner.feedback == "commanded" else paths[:, step]
-        if manner.feedback == "measured":
-            seen[:, :n_actions] += float(plant.range_of("noise")[0]) * rng.normal(
-                size=(n, n_actions)
-            )
-        if isinstance(policy, Policy):
-            observed = watched.observe(seen, goals)
-            if rates is not None:
-                seen[:, :n_actions] = commands[-1]
-                observed[:, rates] = watched.observe(seen, goals)[:, rates]
-            actions = policy(observed)
-        else:
-            actions = policy[:, step]
-        actions = manner.speed * np.clip(actions, -1, 1)
-        if manner.shield:
-            shield.step(told, actions)
-            moved = told.q[:, :n_actions] if known.ideal else told.drive[:, COMMAND]
-            commands.append(moved.copy())
-        else:
-            moved = commands[-1] + actions * simulator.step_limit
-            commands.append(np.clip(moved, lower, upper))
-        late = commands[max(0, len(commands) - 1 - int(plant.range_of("delay")[1]))]
+    arms.begin(starts)
+    horizon = round(task.horizon / manner.speed)
+    rows, commands, q = np.arange(len(starts)), [starts], starts.copy()
+    paths = np.empty((len(starts), horizon + 1, n))
+    paths[:, 0] = starts[:, :n]
+    success, contact = np.zeros((2, len(starts)), dtype=bool)
+    tools = world.poses(q)[:, :3, 3]
+    for step in range(1, horizon + 1):
         running = ~(success | contact)
-        ways = arm.move(late, running | isinstance(policy, np.ndarray))
-        paths[:, step + 1] = ways[:, -1]
-        visited = np.repeat(starts[running, None], ways.shape[1], axis=1)
-        visited[:, :, :n_actions] = ways[running]
-        touched = world.in_contact(visited.reshape(-1, starts.shape[1]))
-        touched = touched.reshape(len(visited), ways.shape[1]).any(axis=1)
-        near = world.distances(visited[:, -1], goals[running]) <= simulator.task.tolerance
-        contact[running], success[running] = touched, ~touched & near
-        if isinstance(policy, Policy) and (success | contact).all():
+        if trained and not running.any():
             break
+        seen, aims = q.copy(), goals.copy()
+        seen[:, :n] += lags.noise * rng.normal(size=(len(q), n))
+        if lags.goal_noise:
+            aims[:, :3] += lags.goal_noise * rng.normal(size=(len(q), 3))
+        last = commands[-1]
+        command = last + manner.speed * (driver.command(seen, aims) - last)
+        if manner.shield:
+            shield.step(told, (command - last)[:, :n] / simulator.step_limit)
+            command = command.copy()
+            command[:, :n] = told.q[:, :n] if known.ideal else told.drive[:, COMMAND]
+        driver.commanded = command
+        commands.append(command)
+        late = np.array(commands)[np.maximum(step - lags.delay, 0), rows, :n]
+        ways = arms.move(late, running | (not trained))
+        paths[:, step] = q[:, :n] = ways[:, -1]
+        visited = np.repeat(q[running, None], ways.shape[1], axis=1)
+        visited[:, :, :n] = ways[running]
+        touched = world.in_contact(visited.reshape(-1, q.shape[1])).reshape(-1, ways.shape[1])
+        contact[running] = touched.any(axis=1)
+        before, tools = tools, world.poses(q)[:, :3, 3]
+        slow = np.linalg.norm(tools - before, axis=1) <= stride
+        near = world.distances(q, goals) <= task.tolerance
+        success |= running & ~contact & near & slow
     return {"success": success, "contact": contact, "paths": paths}
 
 
@@ -223,7 +289,8 @@ def trajectories(simulator: Simulator, count: int = 50) -> float:
     shape = count, simulator.task.horizon // 8, simulator.n_actions
     actions = np.repeat(rng.uniform(-1, 1, shape), 8, axis=1)
     ours = simulator.rollout_actions(actions, starts, goals, record=True)
-    theirs = run(ServoArm(simulator, count), actions, starts, goals)["paths"]
+    arms = ServoArms(simulator, draw_lags(simulator.problem.plant, count, rng))
+    theirs = run(arms, actions, starts, goals, Manner(), rng)["paths"]
     n_actions = simulator.n_actions
     extent = (simulator.arm.upper - simulator.arm.lower)[:n_actions]
     off = np.abs(ours.paths[:, :, :n_actions] - theirs) / extent
@@ -240,11 +307,13 @@ def measure(trials: int) -> dict[str, Any]:
     for name, settings in SETTINGS.items():
         simulator = ideal.with_plant(Plant(**settings))
         apart = trajectories(ideal.with_plant(Plant(**{**settings, "noise": 0.0})))
-        arm, figures = ServoArm(simulator, trials), {}
+        rng, figures = np.random.default_rng(0), {}
+        arms = ServoArms(simulator, draw_lags(simulator.problem.plant, trials, rng))
         for policy in POLICIES:
             trained = load_policy(policy)
             ours = simulator.rollout(trained, starts, goals)
-            theirs = run(arm, trained, starts, goals)
+            manner = Manner(simulator.problem.plant.feedback)
+            theirs = run(arms, trained, starts, goals, manner, np.random.default_rng(0))
             figures[policy] = {
                 "kinarm": [ours.success.mean(), ours.collision.mean()],
                 "mujoco": [theirs["success"].mean(), theirs["contact"].mean()],
@@ -267,8 +336,9 @@ def measure_transfer(trials: int, name: str, path: Path) -> None:
         begun, how = time.process_time(), MANNERS[manner]
         decides = name.startswith("ppo") and manner.startswith("both") and plant in DECISIVE
         count = record["trials"] if decides else round(FEWER * record["trials"])
-        arm = ServoArm(ideal.with_plant(Plant(**LAGS[plant])), count)
-        ended = run(arm, load_policy(name), starts[:count], goals[:count], how)
+        simulator, rng = ideal.with_plant(Plant(**LAGS[plant])), np.random.default_rng(0)
+        arms = ServoArms(simulator, draw_lags(simulator.problem.plant, count, rng))
+        ended = run(arms, load_policy(name), starts[:count], goals[:count], how, rng)
         shares = {key: float(ended[key].mean()) for key in ("success", "contact")}
         seconds = round(time.process_time() - begun, 1)
         cell = {"plant": plant, "manner": manner, "trials": count, **shares, "seconds": seconds}
