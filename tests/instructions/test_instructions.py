@@ -22,7 +22,7 @@ def test_bits_are_those_of_this_processor():
     assert computed_bits(TARGET) == usual_bits()
 
 
-@pytest.mark.slow
+@pytest.mark.rare
 @of_x86_64
 @pytest.mark.skipif(shutil.which("valgrind") is None, reason="needs valgrind (apt-get install it)")
 def test_instructions_are_those_recorded():
