@@ -12,7 +12,7 @@ from pages import DOCS, ROOT, named_blocks
 
 pytest.importorskip("rl_zoo3")
 
-pytestmark = pytest.mark.slow
+pytestmark = pytest.mark.rare
 
 PAGE = (DOCS / "how-to" / "stable_baselines3.md").read_text(encoding="utf-8")
 BLOCKS = named_blocks(DOCS / "how-to" / "stable_baselines3.md")

@@ -19,12 +19,12 @@ PLAIN_LIBRARIES = {
 """What makes libraries believe to run on a machine of 2004."""
 
 
-@pytest.mark.slow
+@pytest.mark.rare
 def test_libraries_for_a_plain_processor_give_the_same_bits():
     assert computed_bits(PLAIN_LIBRARIES) == usual_bits()
 
 
-@pytest.mark.slow
+@pytest.mark.rare
 @pytest.mark.skipif("AVX512_SKX" not in CAN, reason="this processor lacks AVX-512")
 def test_libraries_with_the_longest_vectors_give_the_same_bits():
     assert computed_bits({"OPENBLAS_CORETYPE": "SkylakeX"}) == usual_bits()
