@@ -250,7 +250,10 @@ class KernelCache(FunctionCache):
         key, folder = compiled_in(self._py_func.__module__), Path(self._cache_path)
         if shared := os.environ.get("NUMBA_CACHE_DIR"):
             folder = Path(shared, f"kinarm-{key[:16]}")
-            folder.mkdir(parents=True, exist_ok=True)
+        elif folder.name == "__pycache__":
+            # Beside the source, to which modules of an editable install are links.
+            folder = Path(self._py_func.__code__.co_filename).resolve().parent / folder.name
+        folder.mkdir(parents=True, exist_ok=True)
         return IndexDataCacheFile(str(folder), self._impl.filename_base, key)
 
 

@@ -112,6 +112,16 @@ def test_copies_of_the_sources_share_it(package, value_of_one):
     assert value_of_one(PYTHONPATH=elsewhere) == (40.0, True)
 
 
+def test_links_to_the_sources_share_it(package, value_of_one):
+    """As the modules of an editable install are."""
+    linked = package.parent / "linked" / "arm"
+    for name in SOURCES:
+        (linked / name).parent.mkdir(parents=True, exist_ok=True)
+        (linked / name).symlink_to(package / name)
+    assert value_of_one(NUMBA_CACHE_DIR="", PYTHONPATH=linked.parent) == (40.0, False)
+    assert value_of_one(NUMBA_CACHE_DIR="") == (40.0, True)
+
+
 def test_versions_of_numba_that_are_not_known_are_refused_in_one_line():
     faked = "import numba; numba.version_info = numba.version_info._replace(short=(0, 99))"
     done = subprocess.run(
