@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from docs.measurements.plants import Manner, ServoArms, draw_lags, run
+from docs.measurements.servo_arms import Manner, ServoArms, draw_lags, run
 from docs.measurements.skills import RECORD, SEED
 from kinarm import Plant, Simulator
 from kinarm._files import write_text

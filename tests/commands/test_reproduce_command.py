@@ -40,7 +40,7 @@ class TestQuick:
         assert "reproduction-quick/REPRODUCTION.md" in answer.out
         assert "Traceback" not in answer.err
 
-    def test_figures_are_those_of_the_release(self, quick):
+    def test_figures_are_those_that_were_recorded(self, quick):
         """They lie in ``tests/frozen``."""
         folder, _ = quick
         frozen = (json.loads((each / "claims.json").read_text()) for each in (FROZEN, folder))
