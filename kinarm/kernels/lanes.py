@@ -19,12 +19,10 @@ from numba.core.typing.arraydecl import GetItemBuffer, SetItemBuffer
 from numba.core.typing.templates import AbstractTemplate, Signature, infer_global, signature
 from numba.extending import intrinsic, lower_builtin, lower_cast, models, register_model
 
+from kinarm.kernels.views import FIRST, WORD, ViewType, view_at
+
 LANES = 8
 """Episodes in a value: doubles of the widest vector registers."""
-
-FIRST = {"target": "cpu"}
-"""Makes Numba try an operator on lanes before others: it asks what is specific
-to a target first."""
 
 NUMBERS = ir.VectorType(ir.DoubleType(), LANES)
 BITS = ir.VectorType(ir.IntType(1), LANES)
@@ -250,44 +248,47 @@ def lane_bits(_: Any, condition: types.Type) -> Any:
 
 
 @instruction
-def as_lanes(_: Any, array: types.Array) -> Any:
+def as_lanes(_: Any, array: Any) -> Any:
     """View a contiguous array of float64, with `LANES` in its last axis, as lanes."""
-    return _viewed(array, types.Array(lanes, array.ndim - 1, "C", aligned=False))
+    return _viewed(array, lanes, array.ndim - 1)
 
 
 @instruction
-def as_numbers(_: Any, array: types.Array) -> Any:
+def as_numbers(_: Any, array: Any) -> Any:
     """View a contiguous array of lanes as one of float64, with one axis more."""
-    return _viewed(array, types.Array(types.float64, array.ndim + 1, "C"))
+    return _viewed(array, types.float64, array.ndim + 1)
 
 
-def _viewed(array: types.Array, view: types.Array) -> Any:
+def _viewed(array: Any, dtype: types.Type, ndim: int) -> Any:
     """Signature and code of a view that adds or drops the last axis."""
+    # NumPy's arrays keep their owner.
+    owned = isinstance(array, types.Array)
+    view = types.Array(dtype, ndim, "C", aligned=dtype != lanes) if owned else ViewType(dtype, ndim)
 
     def code(context: Any, builder: Any, _signature: Any, arguments: Any) -> Any:
         from numba.core import cgutils
         from numba.core.imputils import impl_ret_borrowed
-        from numba.np.arrayobj import make_array
+        from numba.np.arrayobj import make_array, populate_array
 
-        given = make_array(array)(context, builder, arguments[0])
-        shape = [*cgutils.unpack_tuple(builder, given.shape, array.ndim), ir.IntType(64)(LANES)]
-        owner = {"meminfo": given.meminfo, "parent": given.parent}
-        made = array_at(context, builder, view, given.data, shape[: view.ndim], **owner)
-        return impl_ret_borrowed(context, builder, view, made)
+        (given,) = arguments
+        if not owned:
+            shape = [*cgutils.unpack_tuple(builder, builder.extract_value(given, 1)), WORD(LANES)]
+            return view_at(context, builder, view, builder.extract_value(given, 0), shape[:ndim])
+        given = make_array(array)(context, builder, given)
+        shape = [*cgutils.unpack_tuple(builder, given.shape), WORD(LANES)][:ndim]
+        made, entry = make_array(view)(context, builder), context.get_data_type(dtype)
+        strides = [WORD(context.get_abi_sizeof(entry))]
+        for length in shape[:0:-1]:
+            strides.insert(0, builder.mul(strides[0], length))
+        populate_array(
+            made,
+            data=builder.bitcast(given.data, entry.as_pointer()),
+            shape=shape,
+            strides=strides,
+            itemsize=strides[-1],
+            meminfo=given.meminfo,
+            parent=given.parent,
+        )
+        return impl_ret_borrowed(context, builder, view, made._getvalue())
 
     return view(array), code
-
-
-def array_at(
-    context: Any, builder: Any, kind: types.Array, data: Any, shape: list[Any], **owner: Any
-) -> Any:
-    """Make an array of a type and shape, in C order, at an address."""
-    from numba.np.arrayobj import make_array, populate_array
-
-    made, entry = make_array(kind)(context, builder), context.get_data_type(kind.dtype)
-    strides = [ir.IntType(64)(context.get_abi_sizeof(entry))]
-    for length in shape[:0:-1]:
-        strides.insert(0, builder.mul(strides[0], length))
-    data = builder.bitcast(data, entry.as_pointer())
-    populate_array(made, data=data, shape=shape, strides=strides, itemsize=strides[-1], **owner)
-    return made._getvalue()

@@ -15,7 +15,6 @@ from types import MappingProxyType
 from typing import Any, TypeAlias
 
 import numpy as np
-from llvmlite import ir
 from numba import from_dtype, types
 from numba.core.typing.templates import AttributeTemplate
 from numba.extending import (
@@ -28,10 +27,8 @@ from numba.extending import (
 )
 from numpy.typing import NDArray
 
-from kinarm.kernels.lanes import LANES, array_at, lanes
-
-WORD = ir.IntType(64)
-"""Entry of a table: address, length, or the bits of a number."""
+from kinarm.kernels.lanes import LANES, lanes
+from kinarm.kernels.views import WORD, ViewType, view_at
 
 CACHE_LINE = 8 * LANES
 """Bytes of a line of the cache, and of lanes."""
@@ -58,7 +55,7 @@ class RecordType(types.Type):
         self.places, end = {}, 0
         for field, kind in fields:
             self.places[field] = end
-            end += 1 + (kind.ndim if isinstance(kind, types.Array) else 0)
+            end += 1 + (kind.ndim if isinstance(kind, ViewType) else 0)
         self.length = end
         # The name is part of the names of functions that take such a record.
         digest = hashlib.sha256(repr((fields, self.fixed)).encode()).hexdigest()
@@ -144,9 +141,7 @@ class Layout:
             end += (CACHE_LINE if entry == lanes else 8) * prod(shape)
         self._words, self._size = np.array(words, dtype=np.int64), end // 8
         self._moved = np.array(moved, dtype=np.int64)
-        kinds = [
-            (field, _array_type(entry, len(shape))) for field, (entry, shape) in shapes.items()
-        ]
+        kinds = [(field, ViewType(entry, len(shape))) for field, (entry, shape) in shapes.items()]
         fixed = {
             field: tuple(int(length) if isinstance(length, Fixed) else None for length in shape)
             for field, (_, shape) in shapes.items()
@@ -172,18 +167,12 @@ def _address(array: NDArray[Any]) -> int:
 
 
 @cache
-def _array_type(entry: types.Type, ndim: int) -> types.Array:
-    # Lanes need not be aligned to their size.
-    return types.Array(entry, ndim, "C", aligned=entry != lanes)
-
-
-@cache
 def _record_type(named: Any, *kinds: Any) -> RecordType:
     """Type of a named tuple's record, with arrays given by types and axes."""
     return RecordType(
         named.__name__,
         tuple(
-            (name, _array_type(from_dtype(np.dtype(kind[0])), kind[1]))
+            (name, ViewType(from_dtype(np.dtype(kind[0])), kind[1]))
             if isinstance(kind, tuple)
             else (name, kind)
             for name, kind in zip(named._fields, kinds, strict=True)
@@ -233,11 +222,11 @@ def _read_field(context: Any, builder: Any, record: RecordType, table: Any, name
         inner.set_metadata("dereferenceable", whole([WORD(8 * kind.length)]))
         inner.set_metadata("align", whole([WORD(8)]))
         return inner
-    if not isinstance(kind, types.Array):
+    if not isinstance(kind, ViewType):
         return word(0, context.get_value_type(kind))
     shape = [
         word(1 + axis, WORD) if length is None else WORD(length)
         for axis, length in enumerate(record.fixed.get(name, (None,) * kind.ndim))
     ]
     data = word(0, context.get_data_type(kind.dtype).as_pointer())
-    return array_at(context, builder, kind, data, shape, meminfo=None)
+    return view_at(context, builder, kind, data, shape)

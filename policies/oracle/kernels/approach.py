@@ -281,8 +281,7 @@ def search(
             within_steps(chain, allowed, start, step_limit, steps - 1, lower, upper)
             for i in range(n):
                 best[i] = tried[0, i, lane]
-        sides = (box[0, :n], box[0, n : 2 * n])
-        block.share[0] = trim(cutoff, bound, slope, least, bend, block.q, half, *sides)
+        block.share[0] = trim(cutoff, bound, slope, least, bend, block.q, half, box)
         # The bound of the joints settles large boxes far from the goal.
         bound = max(bound, joint_bound(bounds, block.poses, goal, half))
         if spin.shape[0] > 0:

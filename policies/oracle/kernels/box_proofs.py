@@ -224,20 +224,21 @@ def trim(
     bend: Array,
     q: Array,
     half: Array,
-    lower: Array,
-    upper: Array,
+    box: Array,
 ) -> float:
-    """Cut off what is beyond the cutoff; return the share that is left.
+    """Cut off what is beyond the cutoff of a box, shape (1, 2 n); return the share that is left.
 
     Takes a bound of at most the cutoff, and what `curved_bound` filled in. A joint is cut where the
     bound exceeds the cutoff though all others add least.
     """
-    share: float = 0.0 * half[0] + 1.0
-    for i in range(half.shape[0]):
+    n, share = half.shape[0], 0.0 * half[0] + 1.0
+    for i in range(n):
         size, h = abs(slope[i]), half[i]
         allowed = cutoff - (bound - least[i]) - bend[i]
         end = max(select(size * h > allowed, allowed / size, h), -h)
-        upper[i] = select(slope[i] > 0.0, min(upper[i], q[0, i] + end), upper[i])
-        lower[i] = select(slope[i] < 0.0, max(lower[i], q[0, i] - end), lower[i])
-        share *= select(h > 0.0, 0.5 * (upper[i] - lower[i]) / h, 1.0)
+        lower, upper = box[0, i], box[0, n + i]
+        upper = select(slope[i] > 0.0, min(upper, q[0, i] + end), upper)
+        lower = select(slope[i] < 0.0, max(lower, q[0, i] - end), lower)
+        box[0, i], box[0, n + i] = lower, upper
+        share *= select(h > 0.0, 0.5 * (upper - lower) / h, 1.0)
     return share

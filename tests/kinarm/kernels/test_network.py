@@ -33,11 +33,14 @@ def act_all(control, block, observations, actions):
     for start in range(0, n, LANES):
         for lane in range(min(LANES, n - start)):
             row[lane] = start + lane
-            given[0, :, lane] = observations[start + lane]
-            weights[0, :, lane] = control.weights[control.policy[start + lane], :own]
+            for i in range(given.shape[1]):
+                given[0, i, lane] = observations[start + lane, i]
+            for i in range(own):
+                weights[0, i, lane] = control.weights[control.policy[start + lane], i]
         choose_actions(control, shared, row, block)
         for lane in range(min(LANES, n - start)):
-            actions[start + lane] = chosen[0, :, lane]
+            for i in range(chosen.shape[1]):
+                actions[start + lane, i] = chosen[0, i, lane]
 
 
 def compiled(networks, observations):

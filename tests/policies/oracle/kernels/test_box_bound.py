@@ -28,9 +28,7 @@ from kinarm.policies.oracle.kernels.rotation import (
 
 
 @njit
-def examine(
-    chain, shapes, bounds, goal, turn, cutoff, wanted, q, half, lower, upper, results, work
-):
+def examine(chain, shapes, bounds, goal, turn, cutoff, wanted, q, half, box, results, work):
     """Distance, bounds, share left, and whether contact is proven, for a box or one in each lane.
 
     The corners are trimmed, and the centre moves to where the linear model is closest to the goal.
@@ -49,7 +47,7 @@ def examine(
     bound = curved_bound(chain, bounds.curvature, *linear, turn, spin, turned)
     results[1] = bound
     results[2] = joint_bound(bounds, poses, goal, half)
-    results[3] = trim(max(bound, cutoff), bound, slope, least, bend, q, half, lower, upper)
+    results[3] = trim(max(bound, cutoff), bound, slope, least, bend, q, half, box)
     for i in range(len(half)):
         q[0, i] = q[0, i] + step[i]
     touching = overlaps(wanted, chain, shapes, poses, half, 1.0, jacobian)
@@ -58,7 +56,7 @@ def examine(
 
 @njit
 def examine_lanes(chain, shapes, bounds, goal, turn, cutoff, arrays, work):
-    q, half, lower, upper, results = arrays
+    q, half, box, results = arrays
     poses, offset, jacobian, step, scale, slope, least, bend, spin, turned = work
     lanes = as_lanes(half)
     examine(
@@ -71,8 +69,7 @@ def examine_lanes(chain, shapes, bounds, goal, turn, cutoff, arrays, work):
         lanes[0] >= 0.0,
         as_lanes(q),
         lanes,
-        as_lanes(lower),
-        as_lanes(upper),
+        as_lanes(box),
         as_lanes(results),
         (
             as_lanes(poses),
@@ -120,11 +117,11 @@ def examined(simulator, centre, half, goal, cutoff=0.0, turn=None):
     chain, n = simulator.arm.chain, simulator.n_actions
     turn = no_turn(n) if turn is None else turn
     bounds, shapes = MotionBounds.of(chain, n), simulator.world.contact_model.shapes
-    lower, upper, results = centre[:n] - half, centre[:n] + half, np.zeros(6)
+    box, results = np.concatenate([centre[:n] - half, centre[:n] + half])[None], np.zeros(6)
     space = work_space(simulator, n_axes=len(turn.axes))
-    parts = (centre[None].copy(), half, lower, upper, results, space)
+    parts = (centre[None].copy(), half, box, results, space)
     examine(chain, shapes, bounds, tuple(goal), turn, cutoff, True, *parts)
-    return results, lower, upper
+    return results, box[0, :n], box[0, n:]
 
 
 def distances(simulator, configurations, goal):
@@ -302,14 +299,15 @@ class TestLanes:
         for first in range(0, len(centres), LANES):
             some, goal = slice(first, first + LANES), goals[first]
             q, half = centres[some].T[None].copy(), halves[some].T.copy()
-            lower, upper, results = q[0, :n] - half, q[0, :n] + half, np.zeros((6, LANES))
-            arrays = (q, half, lower, upper, results)
+            box = np.concatenate([q[0, :n] - half, q[0, :n] + half])[None]
+            results = np.zeros((6, LANES))
+            arrays = (q, half, box, results)
             turn, space = no_turn(n), work_space(simulator, LANES)
             examine_lanes(chain, shapes, bounds, tuple(goal), turn, 0.1, arrays, space)
             for lane in range(LANES):
                 row = first + lane
                 alone = examined(simulator, centres[row], halves[row], goal, 0.1)
-                together = (results[:, lane], lower[:, lane], upper[:, lane])
+                together = (results[:, lane], box[0, :n, lane], box[0, n:, lane])
                 for expected, found in zip(alone, together, strict=True):
                     np.testing.assert_array_equal(found, expected)
             touching += results[4].sum()
