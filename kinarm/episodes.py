@@ -42,8 +42,8 @@ class Rules(NamedTuple):
     time_step, commanded
         Duration of a step [s]; and whether a plant feeds back its command.
     shown, width : ndarray of int, shape (n_parts, 2), and int
-        First entry of each part in the observation of a step, and how often
-        it is there, 0 if not; and entries of that observation.
+        First entry of each part of the observation of a step, and how often
+        it is there; and entries of that observation.
     newton : int
         Errors of a goal that a Newton step of the observation is to remove.
     boxes : ndarray, shape (n_placed, 2, 3)

@@ -5,13 +5,14 @@ chooses some (`kinarm.Observation`).
 """
 
 from collections.abc import Iterator, Sequence
+from functools import cache
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from kinarm.errors import LARGEST
 from kinarm.goals import REST_PARTS
-from kinarm.kernels.compiling import Array, inlined
+from kinarm.kernels.compiling import Array, Stage, inlined
 from kinarm.kernels.elementary import sine_cosine
 from kinarm.kernels.goal_parts import (
     write_goal,
@@ -20,8 +21,9 @@ from kinarm.kernels.goal_parts import (
     write_rest,
     write_rest_error,
 )
+from kinarm.kernels.kinematics import to_world
 from kinarm.kernels.plant import COMMAND
-from kinarm.kernels.session import Session
+from kinarm.kernels.session import POSES, Session
 from kinarm.kernels.surroundings import NEAR, Seen, write_obstacles, write_proximity
 from kinarm.observation_part import ACTUATED, JOINTS, ONCE, SLOTS, Part, Ranges
 from kinarm.scene import Scene
@@ -283,33 +285,41 @@ OBSERVATION = (
 """The parts in order; those per joint go through all joints in turn."""
 
 
-def _compose(parts: Sequence[Part]) -> Any:
-    """Join the formulas of parts into one kernel, inlined by Numba."""
-    write, index = parts[0].write, len(OBSERVATION) - len(parts)
-    write_others = _compose(parts[1:]) if len(parts) > 1 else _write_nothing
-
-    @inlined
-    def write_parts(session: Session, seen: Seen) -> None:
-        shown = session.rules.shown
-        if shown[index, 1] > 0:
-            write(session, seen, shown[index, 0], shown[index, 1])
-        write_others(session, seen)
-
-    return write_parts
-
-
 @inlined
 def _write_nothing(session: Session, seen: Seen) -> None:
     """End of the observation."""
 
 
-_write_step = _compose(OBSERVATION)
+def _compose(parts: Sequence[Part], index: int = 0) -> Any:
+    """Join the formulas of parts into one kernel, inlined by Numba."""
+    if index == len(parts):
+        return _write_nothing
+    write, write_others = parts[index].write, _compose(parts, index + 1)
+
+    @inlined
+    def write_parts(session: Session, seen: Seen) -> None:
+        shown = session.rules.shown
+        write(session, seen, shown[index, 0], shown[index, 1])
+        write_others(session, seen)
+
+    return write_parts
 
 
-@inlined
-def write_observation(session: Session, seen: Seen) -> None:
-    """Write what is seen after a step; what was seen before moves on."""
-    observation, width = session.block.observation, session.rules.width
-    for i in range(observation.shape[1] - 1, width - 1, -1):
-        observation[0, i] = observation[0, i - width]
-    _write_step(session, seen)
+@cache
+def observer(names: tuple[str, ...]) -> Stage:
+    """The stage that writes some parts of a step; what was seen before moves on."""
+    known = {part.name: part for part in OBSERVATION}
+    write_parts = _compose([known[name] for name in names])
+
+    def observe(session: Session, poses: Array) -> int:
+        block, tool, width = session.block, session.chain.tool, session.rules.width
+        for i in range(block.observation.shape[1] - 1, width - 1, -1):
+            block.observation[0, i] = block.observation[0, i - width]
+        frames, goal, joints = poses, block.goal, block.q
+        if block.plant.shape[0] > 0:
+            frames, goal, joints = block.seen_poses, block.seen_goal, block.sensed
+        point = to_world(frames, joints.shape[1], tool[0], tool[1], tool[2])
+        write_parts(session, Seen(poses, frames, point, goal, joints, block.former))
+        return 0
+
+    return Stage(observe, POSES, key=" ".join(names))

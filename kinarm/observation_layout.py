@@ -78,11 +78,10 @@ class ObservationLayout(NamedTuple):
 
     @property
     def shown(self) -> NDArray[np.uint32]:
-        """First entry of each part of `OBSERVATION`, and how often it is there, for kernels."""
-        table = np.zeros((len(OBSERVATION), 2), dtype=np.uint32)
-        for part, place in zip(self.parts, self.places.values(), strict=True):
-            table[OBSERVATION.index(part)] = place.start, self.counts[part.of]
-        return table
+        """First entry of each part, and how often it is there, shape (n_parts, 2), for kernels."""
+        places = zip(self.parts, self.places.values(), strict=True)
+        rows = [(place.start, self.counts[part.of]) for part, place in places]
+        return np.array(rows, dtype=np.uint32).reshape(-1, 2)
 
     def rules(self, problem: ReachProblem) -> dict[str, Any]:
         """What `kinarm.episodes.Rules` have of it."""

@@ -23,10 +23,13 @@ from kinarm.errors import (
 )
 from kinarm.goal_kinematics import GoalKinematics
 from kinarm.kernels.compiling import Array
+from kinarm.kernels.network import ACT_BY_NETWORKS
 from kinarm.kernels.records import recorded
 from kinarm.kernels.rollout import begin
 from kinarm.kernels.screening import screen
 from kinarm.kernels.session import Alone, Block, Session, furnish, work_space
+from kinarm.kernels.shield import REPLACE_STEP
+from kinarm.observation import observer
 from kinarm.observation_layout import ObservationLayout
 from kinarm.problem import ProblemLike, ReachProblem
 from kinarm.scene_draws import SceneDraws
@@ -311,7 +314,8 @@ class World(GoalKinematics, StepContact):
 
     def session(self, control: Control, episodes: Episodes) -> Session:
         """Bind episodes and their source of actions for the kernels."""
-        return Session(*self.records, recorded(control), recorded(episodes))
+        stages = (observer(tuple(self.layout.places)), ACT_BY_NETWORKS, REPLACE_STEP)
+        return Session(*self.records, recorded(control), recorded(episodes), stages)
 
     def _screen_some(self, first: int, last: int, *arrays: Any) -> int:
         """Screen some rows, with work space for this thread alone."""

@@ -33,6 +33,7 @@ from numba.core.untyped_passes import GenericRewrites, InlineClosureLikes
 from numpy.typing import NDArray
 
 from kinarm._console import COMPILING, say_why_it_waits
+from kinarm.kernels.lanes import instruction
 from kinarm.kernels.records import RecordType
 
 Array = NDArray[np.float64]
@@ -51,7 +52,7 @@ def lean_kernel(function: Function) -> Function:
     return _called_by_python(function, _nrt=False, pipeline_class=LaneCompiler)
 
 
-def _called_by_python(function: Function, **more: Any) -> Function:
+def _called_by_python(function: Function, key: str = "", **more: Any) -> Function:
     options: dict[str, Any] = {
         "nogil": True,
         "error_model": "numpy",
@@ -60,8 +61,52 @@ def _called_by_python(function: Function, **more: Any) -> Function:
     } | more
     compiled: Any = njit(**options)(function)
     with suppress(RuntimeError):  # of Numba, if there is no folder that it can write to
-        compiled._cache = KernelCache(function)
+        compiled._cache = KernelCache(function, key)
     return cast("Function", compiled)
+
+
+class Stage:
+    """A part of kernels that they call by its address (`call_stage`), compiled if a session has it.
+
+    So what an episode does without costs no time to compile, and what it does otherwise, little.
+
+    Parameters
+    ----------
+    function : callable
+        It works in lanes, takes a session first, and returns a whole number.
+    more : Numba's types
+        Of its other arguments.
+    key : str
+        Tells functions apart that one definition makes.
+    """
+
+    def __init__(self, function: Callable[..., int], *more: Any, key: str = "") -> None:
+        lean = {"_nrt": False, "pipeline_class": LaneCompiler}
+        self._compiled: Any = _called_by_python(function, key, **lean)
+        self._more = more
+
+    def address(self, session: Any) -> int:
+        """Address of the machine code for a type of sessions."""
+        arguments = (session, *self._more)
+        self._compiled.compile(arguments)
+        code = self._compiled.overloads[arguments]
+        return int(code.library.get_pointer_to_function(code.fndesc.llvm_func_name))
+
+
+@instruction
+def call_stage(_: Any, address: types.Integer, given: Any) -> Any:
+    """Call the `Stage` at an address, and return its result."""
+    kinds = [types.unliteral(kind) for kind in given]
+
+    def code(context: Any, builder: Any, _signature: Any, arguments: Any) -> Any:
+        convention = context.call_conv
+        form = convention.get_function_type(types.int64, kinds)
+        stage = builder.inttoptr(arguments[0], form.as_pointer())
+        values = [builder.extract_value(arguments[1], place) for place in range(len(kinds))]
+        _, result = convention.call_function(builder, stage, types.int64, kinds, values)
+        return result
+
+    return types.int64(address, types.Tuple(kinds)), code
 
 
 def inlined(function: Function) -> Function:
@@ -228,6 +273,14 @@ class KernelCache(FunctionCache):
     Processes with the same sources and versions of Numba and llvmlite share it; with the variable
     ``NUMBA_CACHE_DIR`` also those of other installations.
     """
+
+    def __init__(self, function: Callable[..., Any], key: str) -> None:
+        super().__init__(function)
+        self._key = key
+
+    def _index_key(self, sig: Any, codegen: Any) -> Any:
+        # Sources are part of the file's name.
+        return sig, codegen.magic_tuple(), self._key
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
         """Look machine code up; None if it is missing or damaged."""

@@ -263,7 +263,8 @@ def _viewed(array: Any, dtype: types.Type, ndim: int) -> Any:
     """Signature and code of a view that adds or drops the last axis."""
     # NumPy's arrays keep their owner.
     owned = isinstance(array, types.Array)
-    view = types.Array(dtype, ndim, "C", aligned=dtype != lanes) if owned else ViewType(dtype, ndim)
+    kept = types.Array(dtype, ndim, "C", aligned=dtype != lanes)
+    view: Any = kept if owned else ViewType(dtype, ndim)
 
     def code(context: Any, builder: Any, _signature: Any, arguments: Any) -> Any:
         from numba.core import cgutils

@@ -1,13 +1,14 @@
 """Actions of a block of episodes, by dense networks or from a table."""
 
 import numpy as np
+from numba import types
 from numpy.typing import NDArray
 
 from kinarm.episodes import ELU, HARDTANH, LEAKY_RELU, LINEAR, RELU, SILU, TANH, Control
-from kinarm.kernels.compiling import Array, helper, inlined
+from kinarm.kernels.compiling import Array, Stage, call_stage, helper, inlined
 from kinarm.kernels.elementary import hyperbolic_tangent
 from kinarm.kernels.lanes import as_numbers, select
-from kinarm.kernels.session import Block
+from kinarm.kernels.session import ACT, Session
 
 LEAK = 0.01
 """Slope of the leaky rectifier below zero."""
@@ -122,37 +123,47 @@ def shared_policy(n_episodes: int, control: Control) -> int:
     return control.policy[0]
 
 
+def _act(session: Session, shared: int) -> int:
+    """Fill in the actions of a block by networks; ``shared`` is that of `shared_policy`."""
+    control, block = session.control, session.block
+    layers, activations, signs = control.layers, control.activations, control.observation_signs
+    # Networks with a mirror know goals on the right alone: observations of goals on the left are
+    # reflected, and so are the actions.
+    reflected = block.observation[0, control.side] > 0.0
+    for i in range(signs.shape[0]):
+        given = block.observation[0, i]
+        block.seen[0, i] = select(reflected, signs[i] * given, given)
+    seen = block.seen if signs.shape[0] > 0 else block.observation
+    if shared >= 0:
+        act(layers, activations, control.weights[shared], seen, block.hidden, block.action)
+    else:
+        act(layers, activations, block.weights[0], seen, block.hidden, block.action)
+    if block.newton.shape[0] > 0 and control.rates >= 0:
+        add_to_rates(seen, control.rates, block.action)
+    for axis in range(control.action_signs.shape[0]):
+        action = block.action[0, axis]
+        block.action[0, axis] = select(reflected, action * control.action_signs[axis], action)
+    return 0
+
+
+ACT_BY_NETWORKS = Stage(_act, types.int64)
+
+
 @inlined
-def choose_actions(control: Control, shared: int, row: NDArray[np.int64], block: Block) -> None:
+def choose_actions(shared: int, row: NDArray[np.int64], session: Session) -> None:
     """Fill in the actions of a block.
 
     ``shared`` is that of `shared_policy`, and ``row`` has the block's episodes, -1 for none.
     """
-    layers, activations, signs = control.layers, control.activations, control.observation_signs
-    reflected = block.observation[0, control.side] > 0.0
-    if layers.shape[0] == 0:
+    control, block = session.control, session.block
+    if control.layers.shape[0] > 0:
+        call_stage(session.stages[ACT], (session, shared))
+    else:
         held, steps = as_numbers(block.action), as_numbers(block.steps)
         for lane in range(row.shape[0]):
             if row[lane] >= 0:
                 column = int(steps[0, lane]) if control.actions.shape[1] > 1 else 0
                 for axis in range(held.shape[1]):
                     held[0, axis, lane] = control.actions[row[lane], column, axis]
-    else:
-        # Networks with a mirror know goals on the right alone: observations of goals on the left
-        # are reflected, and so are the actions.
-        for i in range(signs.shape[0]):
-            given = block.observation[0, i]
-            block.seen[0, i] = select(reflected, signs[i] * given, given)
-        seen = block.seen if signs.shape[0] > 0 else block.observation
-        if shared >= 0:
-            weights = control.weights[shared]
-            act(layers, activations, weights, seen, block.hidden, block.action)
-        else:
-            act(layers, activations, block.weights[0], seen, block.hidden, block.action)
-        if block.newton.shape[0] > 0 and control.rates >= 0:
-            add_to_rates(seen, control.rates, block.action)
     for axis in range(block.action.shape[1]):
-        action = min(max(block.action[0, axis], -1.0), 1.0)
-        if signs.shape[0] > 0:
-            action = select(reflected, action * control.action_signs[axis], action)
-        block.action[0, axis] = action
+        block.action[0, axis] = min(max(block.action[0, axis], -1.0), 1.0)

@@ -6,12 +6,10 @@ term is a field of `kinarm.task.RewardWeights` and a formula here, in the same o
 
 import math
 
-from kinarm.kernels.compiling import Array, inlined
+from kinarm.kernels.compiling import Array, call_stage, inlined
 from kinarm.kernels.kinematics import to_world
 from kinarm.kernels.lanes import select
-from kinarm.kernels.session import Block, Session
-from kinarm.kernels.surroundings import Seen
-from kinarm.observation import write_observation
+from kinarm.kernels.session import OBSERVE, Block, Session
 
 PROGRESS, CLOSER, STEP, COLLISION, SUCCESS, ROTATION = range(6)
 """Columns of the terms; `COLLISION` and `SUCCESS` are paid at the end.
@@ -64,14 +62,8 @@ def observe(session: Session, poses: Array) -> float:
 
     Takes the poses of joint frames and bodies.
     """
-    chain, block = session.chain, session.block
-    n_joints, tool = block.q.shape[1], chain.tool
-    point = to_world(poses, n_joints, tool[0], tool[1], tool[2])
-    frames, goal, joints, seen = poses, block.goal, block.q, point
-    if block.plant.shape[0] > 0:
-        frames, goal, joints = block.seen_poses, block.seen_goal, block.sensed
-        seen = to_world(frames, n_joints, tool[0], tool[1], tool[2])
-    write_observation(session, Seen(poses, frames, seen, goal, joints, block.former))
-    goal = block.goal
+    call_stage(session.stages[OBSERVE], (session, poses))
+    goal, tool = session.block.goal, session.chain.tool
+    point = to_world(poses, session.block.q.shape[1], tool[0], tool[1], tool[2])
     dx, dy, dz = goal[0, 0] - point[0], goal[0, 1] - point[1], goal[0, 2] - point[2]
     return math.sqrt(dx * dx + dy * dy + dz * dz)

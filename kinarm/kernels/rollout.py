@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from kinarm.episodes import COLLISION, PAUSED, RUNNING, SUCCESS, TRUNCATED, Episodes, Rules
 from kinarm.kernels.arriving import arrive, measure, put_goal
 from kinarm.kernels.block_proof import doubtful_steps
-from kinarm.kernels.compiling import Array, inlined, lean_kernel
+from kinarm.kernels.compiling import Array, call_stage, inlined, lean_kernel
 from kinarm.kernels.kinematics import forward_kinematics
 from kinarm.kernels.lane_copies import copy_rows, move_bodies, put, put_scene, take, take_rows
 from kinarm.kernels.lanes import LANES, any_lane, as_numbers, lane_bits, select
@@ -19,8 +19,8 @@ from kinarm.kernels.planes import GAP
 from kinarm.kernels.plant import COMMAND, move_joints, rest, sense
 from kinarm.kernels.proof import prove_configurations
 from kinarm.kernels.reward import ROTATION, add_reward, observe, remember
-from kinarm.kernels.session import Session, load_episode, store_episode, take_number
-from kinarm.kernels.shield import REFUSED, replace_step, take_down, unsafe_stops
+from kinarm.kernels.session import SHIELD, Session, load_episode, store_episode, take_number
+from kinarm.kernels.shield import REFUSED, take_down, unsafe_stops
 
 
 @lean_kernel
@@ -129,7 +129,7 @@ def advance(counters: NDArray[np.int64], session: Session) -> int:
         if n_alive == 0:
             return n_paused
         # Act, unless Coal has found the step under way free.
-        choose_actions(control, shared, row, block)
+        choose_actions(shared, row, session)
         fresh = (block.alive[0] > 0.0) & ~(block.cleared[0] > 0.0)
         wanted = fresh & ~(block.shielding[0] > 0.0)
         for i in range(summed):
@@ -167,7 +167,8 @@ def advance(counters: NDArray[np.int64], session: Session) -> int:
                     continue
                 e = row[lane]
                 sure = looks or episodes.touched[e] > 0 or episodes.shielding[e] > 0
-                if shielded and sure and replace_step(lane, e, before, poses, session):
+                asked = (session, lane, e, before, poses)
+                if shielded and sure and call_stage(session.stages[SHIELD], asked):
                     continue
                 # The episode leaves the block, at its end or to wait for Coal.
                 row[lane] = -1

@@ -1,22 +1,28 @@
 """Everything of a batch of episodes in one object, with work space for a block in lanes."""
 
+from collections.abc import Sequence
 from functools import cache
 from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 from llvmlite import ir
 from numba import types
+from numpy.typing import NDArray
 
 from kinarm.chain import Chain
 from kinarm.contact_shapes import PLANE, ContactShapes
 from kinarm.episodes import Control, Episodes, Rules
-from kinarm.kernels.compiling import Array, helper, lean_kernel
+from kinarm.kernels.compiling import Array, Stage, helper, lean_kernel
 from kinarm.kernels.kinematics import POSE, place_bodies
 from kinarm.kernels.lane_copies import move_bodies, put, put_scene, take, take_rows
 from kinarm.kernels.lanes import LANES, as_numbers, instruction, lanes
 from kinarm.kernels.records import Fixed, Layout, Record, Shapes, table
+from kinarm.kernels.views import ViewType
 
 ONE, THREE = Fixed(1), Fixed(3)
+
+POSES = ViewType(lanes, 2)
+"""Type of poses in lanes."""
 
 Block: TypeAlias = Any
 """Work space of a block of episodes, a record of lanes (`layouts`)."""
@@ -250,12 +256,18 @@ class SessionFields(NamedTuple):
     alone: Alone
     tries: Block
     ahead: Block
+    stages: NDArray[np.int64]
+
+
+OBSERVE, ACT, SHIELD = range(3)
+"""Stages of a session: addresses of what writes observations, runs networks, and replaces steps."""
 
 
 class Session(Record):
     """Arm, scene, rules, source of actions, episodes and work space, as records.
 
-    Each thread needs its own, from `of_thread`.
+    Each thread needs its own, from `of_thread`. Takes the stages `OBSERVE`, `ACT` and `SHIELD`, of
+    which those that it has are compiled.
 
     Attributes
     ----------
@@ -263,7 +275,15 @@ class Session(Record):
         As Python sees them.
     """
 
-    def __init__(self, chain: Any, shapes: Any, rules: Any, control: Any, episodes: Any) -> None:
+    def __init__(
+        self,
+        chain: Any,
+        shapes: Any,
+        rules: Any,
+        control: Any,
+        episodes: Any,
+        stages: Sequence[Stage],
+    ) -> None:
         self.control: Control = control.values
         self.episodes: Episodes = episodes.values
         weights, n_observations = self.control.weights, self.episodes.observation.shape[1]
@@ -287,18 +307,24 @@ class Session(Record):
         }
         space = work_space(**sizes)
         furnish(shapes.values.placed, *space)
-        more = [
+        tries, ahead = (
             layouts(**sizes)[0].record() if needed else space[0]
             for needed in (sizes["shares"], sizes["looks"])
-        ]
-        parts = SessionFields(chain, shapes, rules, control, episodes, *space, *more)
+        )
+        addresses = np.zeros(len(stages), dtype=np.int64)
+        given = (chain, shapes, rules, control, episodes)
+        parts = SessionFields(*given, *space, tries, ahead, addresses)
         super().__init__(*table(parts), parts)
+        for place, has in enumerate((True, len(self.control.layers) > 0, sizes["shares"] > 0)):
+            if has:
+                addresses[place] = stages[place].address(self._numba_type_)
         self._others: list[Session] = []
+        self._given = (*given, stages)
 
     def of_thread(self, number: int) -> "Session":
         """The session of a thread; this one is that of thread 0."""
         while len(self._others) < number:
-            self._others.append(Session(*self.values[:5]))
+            self._others.append(Session(*self._given))
         return self._others[number - 1] if number else self
 
     def refill(self, control: Control, starts: Array, goals: Array, shift: Array | None) -> bool:

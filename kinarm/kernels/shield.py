@@ -11,10 +11,12 @@ be free of where these will be in `WARNING` seconds, if they go on as in the ste
 
 import math
 
+from numba import types
+
 from kinarm.contact_shapes import WITH_HALFSPACE
 from kinarm.episodes import Episodes
 from kinarm.kernels.block_proof import doubtful_steps
-from kinarm.kernels.compiling import Array, helper, inlined
+from kinarm.kernels.compiling import Array, Stage, helper, inlined
 from kinarm.kernels.kinematics import forward_kinematics, rotated
 from kinarm.kernels.lane_copies import (
     copy_rows,
@@ -37,7 +39,7 @@ from kinarm.kernels.plant import (
     move_joints,
 )
 from kinarm.kernels.proof import is_apart
-from kinarm.kernels.session import Block, Session
+from kinarm.kernels.session import POSES, Block, Session
 
 REFUSED, REPLACED = 1, 2
 """States of a step that is to be replaced, as Coal refuses it, and of one that is (`Episodes`)."""
@@ -61,9 +63,8 @@ MOST_STEPS = 500
 """Steps after which joints that do not rest are not looked at further."""
 
 
-@helper
-def replace_step(lane: int, e: int, before: Array, poses: Array, session: Session) -> bool:
-    """Replace a step of an episode that touches; whether that leaves it free.
+def _replace_step(session: Session, lane: int, e: int, before: Array, poses: Array) -> int:
+    """Replace a step of an episode that touches; 1 if that leaves it free, else 0.
 
     What may replace it is tried in the order of its distance from the step, in all lanes of
     ``tries`` at once. Poses are ``before`` the step and at the target.
@@ -115,9 +116,12 @@ def replace_step(lane: int, e: int, before: Array, poses: Array, session: Sessio
         for place in range(count):
             if found >> place & 1 or (rests and place == last):
                 take_over(place, lane, poses, block, tries)
-                return found >> place & 1 == 1
+                return found >> place & 1
         source, there, pair = tries, tries.after, episodes.touched[e]
         nearest = math.inf if last >= 0 else nearest
+
+
+REPLACE_STEP = Stage(_replace_step, types.int64, types.int64, POSES, POSES)
 
 
 @inlined

@@ -66,7 +66,7 @@ def view_at(context: Any, builder: Any, kind: ViewType, data: Any, shape: list[A
 def _indexed(view: types.Type, index: types.Type) -> tuple[int, types.Type]:
     """How many axes of a view an index of whole numbers is for, and its type; 0 for any other."""
     several = isinstance(index, types.BaseTuple)
-    numbers = tuple(index) if several else (index,)
+    numbers: Any = index if several else (index,)
     whole = all(isinstance(number, types.Integer) for number in numbers)
     axes = len(numbers) if isinstance(view, ViewType) and whole else 0
     return axes, types.UniTuple(types.intp, axes) if several else types.intp
@@ -77,7 +77,8 @@ class _Read(AbstractTemplate):
     metadata = FIRST
 
     def generic(self, arguments: tuple[types.Type, ...], _: Any) -> Any:
-        view, (axes, index) = arguments[0], _indexed(*arguments)
+        view: Any = arguments[0]
+        axes, index = _indexed(*arguments)
         if axes == 0:
             return None
         left = view.ndim - axes
@@ -89,7 +90,8 @@ class _Write(AbstractTemplate):
     metadata = FIRST
 
     def generic(self, arguments: tuple[types.Type, ...], _: Any) -> Any:
-        view, (axes, index) = arguments[0], _indexed(*arguments[:2])
+        view: Any = arguments[0]
+        axes, index = _indexed(*arguments[:2])
         if axes == 0 or axes < view.ndim:
             return None
         return signature(types.none, view, index, view.dtype)

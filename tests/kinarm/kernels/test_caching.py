@@ -41,6 +41,20 @@ from kinarm.kernels.compiling import inlined
 def scaled(x):
     return 10.0 * plus(x)
 """,
+    "kernels/stages.py": """
+from numba import njit, types
+from kinarm.kernels.compiling import Stage, call_stage
+
+def stage(factor):
+    def times(number):
+        return factor * number
+
+    return Stage(times, key=str(factor)).address(types.int64)
+
+@njit
+def call(address, number):
+    return call_stage(address, (number,))
+""",
     "kernels/other.py": "",
     "kernels/__init__.py": "",
     "__init__.py": "",
@@ -110,6 +124,16 @@ def test_copies_of_the_sources_share_it(package, value_of_one):
     elsewhere = package.parent / "elsewhere"
     shutil.copytree(package, elsewhere / "arm")
     assert value_of_one(PYTHONPATH=elsewhere) == (40.0, True)
+
+
+def test_stages_of_one_definition_are_kept_apart(package):
+    script = "from arm.kernels.stages import *; print(*(call(stage(k), 7) for k in (2, 3, 2)))"
+    folders = {"NUMBA_CACHE_DIR": str(package.parent / "cache"), "PYTHONPATH": str(package.parent)}
+    for _ in range(2):
+        run = [sys.executable, "-c", script]
+        found = subprocess.check_output(run, env=os.environ | folders, text=True)
+        assert found.split() == ["14", "21", "14"]
+    assert len(list((package.parent / "cache").rglob("*.nbc"))) == 2
 
 
 def test_links_to_the_sources_share_it(package, value_of_one):

@@ -1,13 +1,16 @@
 """Compiled networks of all widths and functions, mirrored or not, against NumPy."""
 
 from itertools import pairwise
+from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
-from numba import njit
+from numba import njit, typeof
 
+from kinarm.kernels.compiling import call_stage
 from kinarm.kernels.lanes import LANES, as_numbers
-from kinarm.kernels.network import choose_actions, shared_policy
+from kinarm.kernels.network import ACT_BY_NETWORKS, shared_policy
+from kinarm.kernels.records import recorded
 from kinarm.kernels.session import work_space
 from kinarm.networks import Layer, Mirror, Networks, network_control
 from kinarm.policies.arm_policy import activated
@@ -24,20 +27,26 @@ FUNCTIONS = {
 SEVEN = ("hardtanh", "silu", "elu", "leaky_relu", "tanh", "relu", "linear")
 
 
+class Actor(NamedTuple):
+    """What a session's stage of networks reads."""
+
+    control: Any
+    block: Any
+
+
 @njit
-def act_all(control, block, observations, actions):
-    n = len(observations)
+def act_all(stage, actor, observations, actions):
+    n, control, block = len(observations), actor.control, actor.block
     shared, own = shared_policy(n, control), block.weights.shape[1]
     given, weights = as_numbers(block.observation), as_numbers(block.weights)
-    chosen, row = as_numbers(block.action), np.full(LANES, -1)
+    chosen = as_numbers(block.action)
     for start in range(0, n, LANES):
         for lane in range(min(LANES, n - start)):
-            row[lane] = start + lane
             for i in range(given.shape[1]):
                 given[0, i, lane] = observations[start + lane, i]
             for i in range(own):
                 weights[0, i, lane] = control.weights[control.policy[start + lane], i]
-        choose_actions(control, shared, row, block)
+        call_stage(stage, (actor, shared))
         for lane in range(min(LANES, n - start)):
             for i in range(chosen.shape[1]):
                 actions[start + lane, i] = chosen[0, i, lane]
@@ -55,8 +64,9 @@ def compiled(networks, observations):
         widest=max(control.layers),
         own=control.weights.shape[1] if len(control.weights) > 1 else 0,
     )
-    act_all(control, block, observations, actions)
-    return actions
+    actor = recorded(Actor(recorded(control), block))
+    act_all(ACT_BY_NETWORKS.address(typeof(actor)), actor, observations, actions)
+    return actions.clip(-1, 1)
 
 
 def random_networks(widths, count=1, seed=0, **settings):
