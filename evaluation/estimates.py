@@ -37,7 +37,6 @@ def estimate_metrics(outcomes: Outcomes, less: Outcomes | None = None) -> dict[s
     known = {
         name: metric
         for name, metric in METRICS.items()
-        if all(side.bounds is not None for side in sides) or not metric.needs_bounds
         if all(side.holding for side in sides) or not metric.needs_holding
     }
     intervals = _bootstrapped(sides, known) | _of_means(sides, known)

@@ -42,8 +42,8 @@ class Metric:
     interval : ``"mid-P"``, ``"Student"``, ``"bootstrap"`` or None
         How its 95 % interval is made. The first two are for shares and means
         of trials; the formula also gets each trial by itself.
-    needs_bounds, needs_holding : bool
-        Whether it needs the oracle, or trials that go on after success.
+    needs_holding : bool
+        Whether it needs trials that go on after success.
     heading, spread_heading : str
         Headings of its column, and of its range over training seeds; without
         one it is in documents alone.
@@ -61,7 +61,6 @@ class Metric:
     formula: Callable[[Outcomes], Any]
     unit: str = ""
     interval: Literal["mid-P", "Student", "bootstrap"] | None = None
-    needs_bounds: bool = False
     needs_holding: bool = False
     heading: str = ""
     digits: int = 3
@@ -122,7 +121,6 @@ METRICS: dict[str, Metric] = {
         definition="success / success of the oracle, both over the bounded trials",
         formula=lambda trials: trials.relative_success,
         unit="%",
-        needs_bounds=True,
         heading="relative success %",
         digits=1,
         priority=11,
@@ -252,7 +250,6 @@ METRICS: dict[str, Metric] = {
         meaning="median of steps divided by the bound, over the bounded trials that succeeded",
         definition="median of kᵢ / bᵢ over the bounded i ∈ S",
         formula=lambda trials: _median_or_none(trials.step_ratio),
-        needs_bounds=True,
         heading="step ratio",
         digits=2,
         beside=("step_ratio_p95", "p95 {}"),
@@ -264,7 +261,6 @@ METRICS: dict[str, Metric] = {
         formula=lambda trials: (
             np.percentile(trials.step_ratio, 95) if trials.step_ratio.size else None
         ),
-        needs_bounds=True,
         digits=2,
     ),
     **{

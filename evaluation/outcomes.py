@@ -9,7 +9,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kinarm.episodes import Rollouts
-from kinarm.errors import InvalidInputError
 from kinarm.evaluation.schemas import Document
 from kinarm.evaluation.trials import TrialSet
 
@@ -143,27 +142,25 @@ class Outcomes:
 
     @property
     def relative_success(self) -> float | None:
-        """Success divided by the oracle's, in the bounded trials."""
-        reachable = self._known_bounds.reachable
+        """Success divided by the oracle's, in the bounded trials; None if that is unknown or 0."""
+        if self.bounds is None or not self.bounds.reachable.any():
+            return None
+        reachable = self.bounds.reachable
         succeeded = [rollouts.success[: len(reachable)] for rollouts in self.rollouts]
-        return float(np.mean(succeeded) / reachable.mean()) if reachable.any() else None
+        return float(np.mean(succeeded) / reachable.mean())
 
     @cached_property
     def step_ratio(self) -> NDArray[np.float64]:
         """Steps over those proven necessary, of successful bounded trials, one axis."""
-        necessary = self._known_bounds.steps_lower_bound
+        if self.bounds is None:
+            return np.empty(0)
+        necessary = self.bounds.steps_lower_bound
         bounded = slice(len(necessary))
         ratios = [
             (rollouts.steps[bounded] / necessary)[rollouts.success[bounded]]
             for rollouts in self.rollouts
         ]
         return np.concatenate(ratios)
-
-    @property
-    def _known_bounds(self) -> Any:
-        if self.bounds is None:
-            raise InvalidInputError("there are no bounds: the evaluation was made without them")
-        return self.bounds
 
 
 class Cause(Document, frozen=True):

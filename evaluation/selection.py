@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from kinarm.errors import InvalidInputError
-from kinarm.evaluation.contestants import BASELINES, ORACLE, UNTRAINED, Contestant
+from kinarm.evaluation.contestants import BASELINES, ORACLE, Contestant
 from kinarm.evaluation.finding import check_normalizing, find_contestants
 from kinarm.policies.library import group_of, is_shipped, policy_names
 from kinarm.problem import PROBLEMS, ReachProblem
@@ -40,23 +40,17 @@ def select_pairs(request: "EvaluationRequest") -> list[Pair]:
     behind = [
         each.shielded()
         for each, without in zip(chosen, bare, strict=True)
-        if each not in UNTRAINED.values()
-        and (
-            request.shield
-            or each is not without
-            or (each.recipe == SHOWN_SHIELDED and not request.policies)
-        )
+        if request.shield
+        or each is not without
+        or (each.recipe == SHOWN_SHIELDED and not request.policies)
     ]
     chosen = [*bare, *(each for each in behind if each not in bare)]
-    changed = partial(_changed, request)
-    pairs = []
-    for problem, contestant in product(named or _problems(request, chosen), chosen):
-        if request.matrix:
-            faces = True
-        else:
-            faces = bool(request.policies and named) or contestant.serves(problem, changed)
-        if faces:
-            pairs.append((contestant, problem))
+    stated = request.matrix or (request.policies and named)
+    pairs = [
+        (contestant, problem)
+        for problem, contestant in product(named or _problems(request, chosen), chosen)
+        if stated or contestant.serves(problem, partial(_changed, request))
+    ]
     if request.oracle and ORACLE not in chosen:
         faced = {problem.digest: problem for _, problem in pairs}
         pairs += [(ORACLE, problem) for problem in faced.values()]

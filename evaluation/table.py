@@ -1,6 +1,7 @@
 """The table of an evaluation, for terminals, Markdown and reports."""
 
 from collections.abc import Callable, Collection, Mapping, Sequence
+from itertools import chain
 from operator import attrgetter
 from typing import TYPE_CHECKING, NamedTuple, TypeVar
 
@@ -146,22 +147,20 @@ def print_table(
     columns : sequence of Column
         Columns to print, all of them, instead of those that say something.
     """
+
+    def show(chosen: Sequence[Column[T]], groups: Sequence[Sequence[T]]) -> None:
+        if markdown:
+            print_markdown(chosen, [*chain(*groups)], console)
+        else:
+            print_columns(chosen, groups, console, whole=bool(columns), advice=CHOOSE)
+
     groups = [table_rows(document, problem) for problem in document.protocol.problems]
-    rows = every_row(document)
     labels = (column for column in all_columns() if column.is_label)
-    shown = columns or [*labels, *telling_columns(rows)]
-    if markdown:
-        print_markdown(shown, rows, console)
-    else:
-        print_columns(shown, groups, console, whole=bool(columns), advice=CHOOSE)
+    show(columns or [*labels, *telling_columns([*chain(*groups)])], groups)
     if differences := document.differences:
         names = METRICS if markdown and not columns else [column.name for column in columns]
-        less = difference_columns(differences, names)
         console.print()
-        if markdown:
-            print_markdown(less, differences, console)
-        else:
-            print_columns(less, [differences], console, whole=bool(columns), advice=CHOOSE)
+        show(difference_columns(differences, names), [differences])
 
 
 def table_rows(document: EvaluationDocument, problem: str) -> list[Row]:
@@ -171,8 +170,3 @@ def table_rows(document: EvaluationDocument, problem: str) -> list[Row]:
     single = [row for row in document.results if row.problem == problem]
     rows = (*pooled, *(row for row in single if row.policy not in members))
     return sorted(rows, key=lambda row: -(row.metrics["success"].value or 0.0))
-
-
-def every_row(document: EvaluationDocument) -> list[Row]:
-    """The rows of all problems."""
-    return [row for problem in document.protocol.problems for row in table_rows(document, problem)]

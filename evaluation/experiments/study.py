@@ -207,7 +207,7 @@ class Study:
         """Read the folder again."""
         if self.experiment.search:
             self.runs = self._planned()
-        for name in ("finished", "bounds", "_groups"):
+        for name in ("finished", "bounds"):
             self.__dict__.pop(name, None)
 
     def status(self) -> list[str]:
@@ -263,33 +263,25 @@ class Study:
 
     def groups(self) -> tuple[Group, ...]:
         """The finished trainings, in groups that differ in the seed alone."""
-        return self._groups
-
-    @cached_property
-    def _groups(self) -> tuple[Group, ...]:
         shared: dict[tuple[str, str], list[Run]] = {}
         for run in self.finished:
             config = {k: v for k, v in run.settings["config"].items() if k != "seed"}
             shared.setdefault((run.entry.name, repr((run.learner, config))), []).append(run)
-        groups = [
-            Group(
+        groups, firsts = list[Group](), dict[str, Group]()
+        for runs in shared.values():
+            digest = runs[0].config.problem.digest
+            group = Group(
                 label=self._label(runs[0]),
                 entry=runs[0].entry,
                 config=runs[0].config,
                 choices=runs[0].choices,
                 runs=tuple(self.finished[run] for run in runs),
-                bounds=self.bounds.get(runs[0].config.problem.digest),
+                bounds=self.bounds.get(digest),
+                first=firsts.get(digest),
             )
-            for runs in shared.values()
-        ]
-        first: dict[str, Group] = {}
-        for group in groups:
-            first.setdefault(group.config.problem.digest, group)
-        firsts = (first[group.config.problem.digest] for group in groups)
-        return tuple(
-            group if group is other else replace(group, first=other)
-            for group, other in zip(groups, firsts, strict=True)
-        )
+            firsts.setdefault(digest, group)
+            groups.append(group)
+        return tuple(groups)
 
     def best(self, count: int = 1) -> tuple[Group, ...]:
         """The groups with the largest relative success, best first."""

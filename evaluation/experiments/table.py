@@ -133,8 +133,7 @@ def figures_of(outcomes: Outcomes) -> dict[str, float]:
     """Figures of merit of some trainings; NaN for unknown ones."""
     found = {}
     for name in FIGURES:
-        known = outcomes.bounds is not None or not METRICS[name].needs_bounds
-        value = METRICS[name].formula(outcomes) if known else None
+        value = METRICS[name].formula(outcomes)
         found[name] = math.nan if value is None else float(value)
     return found
 
