@@ -253,13 +253,17 @@ def run_request(
     arguments: Sequence[str] | None = None,
     *,
     skip: Collection[str] = (),
+    others: Mapping[str, tuple[type, Callable[[Any, str], None]]] | None = None,
 ) -> NoReturn:
     """Run a command line whose options are the fields of a request; see `run_command`.
 
     The first line of the request's class describes the command. ``report`` runs a request and
-    prints; it also gets the command as typed, by default in this process.
+    prints; it also gets the command as typed, by default in this process. If the first word is one
+    of ``others``, their request and report take the rest.
     """
     typed = sys.argv[1:] if arguments is None else arguments
+    if others and typed and typed[0] in others:
+        run_request(f"{prog} {typed[0]}", *others[typed[0]], typed[1:])
     parser = Parser(prog=prog, description=_first_line(kind))
     add_options(parser, kind, skip=skip)
     command = " ".join([prog, *map(shlex.quote, typed)])

@@ -14,7 +14,6 @@ from kinarm._tables import print_table
 from kinarm.evaluation.commands.study import BOUNDING, RunningOptions
 
 if TYPE_CHECKING:
-    from kinarm.evaluation.experiments.executors import Executor
     from kinarm.evaluation.experiments.experiment import Experiment
     from kinarm.evaluation.paper.claims import Claim
 
@@ -58,13 +57,10 @@ class ReproductionRequest(RunningOptions):
         wanted = (entry for entry in shipped.entries if self.ppo or entry.learner != "ppo")
         return replace(shipped, entries=tuple(wanted))
 
-    def run(
-        self, executor: "Executor | None" = None, command: str | None = None
-    ) -> "Sequence[Claim]":
+    def run(self, command: str | None = None) -> "Sequence[Claim]":
         """Run the missing trainings, write the results, and return the claims read literally.
 
-        ``executor`` replaces the options about where trainings run; ``command``
-        is recorded, by default this request.
+        ``command`` is recorded, by default this request.
 
         Raises
         ------
@@ -77,8 +73,7 @@ class ReproductionRequest(RunningOptions):
         study = Study(self.experiment, self.folder)
         threads = max(1, available_threads() // (self.jobs or available_threads()))
         with telling(lambda: GOES_ON):
-            chosen = executor or self.executor(self.folder, threads)
-            study.run(threads=threads, executor=chosen)
+            study.run(threads=threads, executor=self.executor(self.folder, threads))
             with open_console(stderr=True).status(BOUNDING):
                 return write_all(study, command or repr(self))
 

@@ -1,8 +1,8 @@
 """``kinarm-run``: drive an arm by a policy, and check an arm against its contract."""
 
-import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
@@ -18,8 +18,6 @@ if TYPE_CHECKING:
     from kinarm.policies.running.backend import WiredArm
     from kinarm.policies.running.run import Run
     from kinarm.simulator import Simulator
-
-PROG = "kinarm-run"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -147,14 +145,6 @@ class CheckRequest(ArmOptions):
     at: tuple[str, ...] = field(default=("home",), metadata={"metavar": "home|Q"})
 
 
-def main(arguments: Sequence[str] | None = None) -> None:
-    """Run the command line."""
-    typed = sys.argv[1:] if arguments is None else arguments
-    if typed[:1] == ["check"]:
-        run_request(f"{PROG} check", CheckRequest, _check, typed[1:])
-    run_request(PROG, RunRequest, _drive, typed)
-
-
 def _drive(request: RunRequest, _: str) -> None:
     """Run a policy; print how each goal went, and keep what was recorded."""
     import numpy as np
@@ -230,3 +220,9 @@ def _check(request: CheckRequest, _: str) -> None:
     print("passed: joints read what they have at the pose, and move as they are told")
     for line in check.unseen():
         print(f"not seen at this pose: {line}")
+
+
+OTHERS = {"check": (CheckRequest, _check)}
+
+main = partial(run_request, "kinarm-run", RunRequest, _drive, others=OTHERS)
+"""Run the command line."""

@@ -1,8 +1,8 @@
 """``kinarm-study``: the trainings of an experiment."""
 
-import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, ClassVar
 
@@ -17,8 +17,6 @@ from kinarm.errors import InvalidInputError, TrainingFailedError
 if TYPE_CHECKING:
     from kinarm.evaluation.experiments.executors import Executor
     from kinarm.evaluation.experiments.study import Study
-
-PROG = "kinarm-study"
 
 BOUNDING = "bounding what could be reached, drawing figures"
 
@@ -132,11 +130,10 @@ class StudyRequest(RunningOptions, TableOptions):
         """Where the files go."""
         return self.out or Path(self.experiment.stem)
 
-    def run(self, executor: "Executor | None" = None, command: str | None = None) -> "Study":
+    def run(self, command: str | None = None) -> "Study":
         """Run the missing trainings, and write the results.
 
-        ``executor`` replaces the options about where trainings run; ``command``
-        is recorded, by default this request.
+        ``command`` is recorded, by default this request.
 
         Raises
         ------
@@ -159,7 +156,7 @@ class StudyRequest(RunningOptions, TableOptions):
             failed = None
             try:
                 if self.train:
-                    where = executor or self.executor(self.folder, self.threads)
+                    where = self.executor(self.folder, self.threads)
                     study.run(jobs=self.jobs, threads=self.threads, executor=where)
             except TrainingFailedError as error:
                 failed = error
@@ -182,14 +179,6 @@ class StatusRequest:
     """
 
     folder: Path = field(metadata={"flag": "folder", "metavar": "DIR"})
-
-
-def main(arguments: Sequence[str] | None = None) -> None:
-    """Run the command line."""
-    typed = sys.argv[1:] if arguments is None else arguments
-    if typed[:1] == ["status"]:
-        run_request(f"{PROG} status", StatusRequest, _status, typed[1:])
-    run_request(PROG, StudyRequest, _carry_out, typed)
 
 
 def _carry_out(request: StudyRequest, command: str) -> None:
@@ -219,3 +208,9 @@ def _status(request: StatusRequest, _: str) -> None:
     from kinarm.evaluation.experiments.study import Study
 
     print("\n".join(Study.load(request.folder).status()))
+
+
+OTHERS = {"status": (StatusRequest, _status)}
+
+main = partial(run_request, "kinarm-study", StudyRequest, _carry_out, others=OTHERS)
+"""Run the command line."""

@@ -68,7 +68,7 @@ class TestQuick:
             assert (folder / f"{figure}.png").read_bytes().startswith(b"\x89PNG")
             assert b"</svg>" in (folder / f"{figure}.svg").read_bytes()
 
-    def test_goes_on_where_it_stopped_with_any_executor(self, quick, tmp_path):
+    def test_goes_on_where_it_stopped_with_any_executor(self, quick, tmp_path, monkeypatch):
         """What is there is not trained again, and the same is written."""
         folder = tmp_path / "copy"
         shutil.copytree(quick[0], folder)
@@ -76,8 +76,9 @@ class TestQuick:
         first.unlink()
         second.write_bytes(second.read_bytes()[:1000])
         executor = Counting()
+        monkeypatch.setattr(ReproductionRequest, "executor", lambda *_: executor)
         request = ReproductionRequest(quick=True, out=folder)
-        claims = request.run(executor, command="kinarm-reproduce " + " ".join(map(str, QUICK)))
+        claims = request.run(command="kinarm-reproduce " + " ".join(map(str, QUICK)))
         assert len(executor.tasks) == 2
         assert contents(folder) == contents(quick[0])
         assert claims[0].name == "ars-left"
