@@ -163,7 +163,14 @@ class ReplayRequest(ProblemOptions):
             If a file, name or number cannot be used, or a file cannot be
             written.
         """
-        return self._write(report) if self.play is None else self._write_playground(report)
+        usual, acts = (PAGE, "plays") if self.play is None else (PLAYGROUND, "runs")
+        out = self.out or Path(usual)
+        own = self.out is None and out.is_file() and GENERATOR in out.read_bytes()[:2000]
+        check_output(out, overwrite=self.overwrite or own)
+        page = self._replay(report) if self.play is None else self._playground()
+        page.save(out)
+        report(f"written: {out}, {len(page.html) / 1e6:.1f} MB, {acts} offline in any browser")
+        return page
 
     def recordings(self) -> "list[list[Recording]]":
         """Make or read the recordings to play, a list for each policy.
@@ -177,29 +184,17 @@ class ReplayRequest(ProblemOptions):
 
         return chosen_recordings(self).runs
 
-    def _checked_out(self, usual: str) -> Path:
-        """The page to write; a page of kinarm with the default name is replaced."""
-        out = self.out or Path(usual)
-        own = self.out is None and out.is_file() and GENERATOR in out.read_bytes()[:2000]
-        check_output(out, overwrite=self.overwrite or own)
-        return out
-
-    def _write_playground(self, report: Callable[[str], object]) -> "HtmlPage":
+    def _playground(self) -> "HtmlPage":
         from kinarm.evaluation.replay.playground import playground
 
-        out = self._checked_out(PLAYGROUND)
         with open_console(stderr=True).status("making the page"):
-            page = playground(self)
-        page.save(out)
-        report(f"written: {out}, {len(page.html) / 1e6:.1f} MB, runs offline in any browser")
-        return page
+            return playground(self)
 
-    def _write(self, report: Callable[[str], object]) -> "HtmlPage":
+    def _replay(self, report: Callable[[str], object]) -> "HtmlPage":
         from kinarm.evaluation.replay.recordings import chosen_recordings
         from kinarm.recording import save_recordings
         from kinarm.viewer import replay_page
 
-        out = self._checked_out(PAGE)
         if self.record is not None:
             check_output(self.record, overwrite=self.overwrite, suffix=".npz")
         with open_console(stderr=True).status("recording"):
@@ -210,7 +205,6 @@ class ReplayRequest(ProblemOptions):
             page = replay_page(runs[0], ghosts=ghosts, groups=groups, heading=heading)
         if self.record is not None:
             save_recordings(self.record, [recording for run in runs for recording in run])
-        page.save(out)
         for note in dict.fromkeys(run[0].provenance.get("note") for run in runs):
             if note:
                 report(note)
@@ -221,7 +215,6 @@ class ReplayRequest(ProblemOptions):
         for trial in zip(*runs, strict=True) if not groups else ():
             for recording in trial:
                 report(described(recording))
-        report(f"written: {out}, {len(page.html) / 1e6:.1f} MB, plays offline in any browser")
         return page
 
 

@@ -2,7 +2,7 @@
 
 from collections import Counter
 from collections.abc import Collection, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING, NamedTuple
 
 from kinarm._fields import to_plain
@@ -60,8 +60,7 @@ def record(
     PolicyFileError
         If the policy was trained for another arm, which is not allowed.
     """
-    simulator = trials.simulator
-    contestant.check(simulator.problem, simulator.arm, allow_other_arm=allow_other_arm)
+    contestant.check(trials.problem, trials.simulator.arm, allow_other_arm=allow_other_arm)
     rollouts = contestant.run(trials, record=True)
     made = to_plain(contestant.policy.provenance) if contestant.policy else None
     known = [] if bounds is None else bounds.steps_lower_bound.tolist()
@@ -81,12 +80,11 @@ def record(
     )
 
 
-@dataclass(frozen=True)
-class Candidates:
-    """Trials to choose from, and their set if they are run now."""
+class Candidates(NamedTuple):
+    """Trials to choose from, and their set if they are run now and the oracle is to be asked."""
 
     trials: list[Trial]
-    faced: TrialSet | None = None
+    bounded: TrialSet | None = None
 
 
 class Chosen(NamedTuple):
@@ -112,14 +110,14 @@ def chosen_recordings(request: "ReplayRequest") -> Chosen:
     candidates = _find_candidates(request)
     trials = candidates.trials
     if request.failures:
-        return _failures(candidates, oracle=request.oracle)
+        return _failures(candidates)
     if request.trial:
         chosen = _numbered(trials, request.trial)
     elif request.worst is not None:
         chosen = _worst(trials, request.worst)
     else:
         chosen = trials
-    return Chosen(_with_bounds(candidates, chosen, oracle=request.oracle))
+    return Chosen(_with_bounds(candidates, chosen))
 
 
 def _find_candidates(request: "ReplayRequest") -> Candidates:
@@ -146,7 +144,7 @@ def _fresh_candidates(request: "ReplayRequest", names: Sequence[str]) -> Candida
     trials = TrialSet.draw(problem, count, request.seed or 0)
     other = request.allow_other_arm
     runs = [record(contestant, trials, allow_other_arm=other) for contestant in contestants]
-    return Candidates(list(zip(*runs, strict=True)), trials)
+    return Candidates(list(zip(*runs, strict=True)), trials if request.oracle else None)
 
 
 def named_contestants(
@@ -172,22 +170,20 @@ def named_contestants(
     return contestants, request.resolve(trained[0])
 
 
-def _with_bounds(
-    candidates: Candidates, chosen: Sequence[Trial], *, oracle: bool
-) -> list[list[Recording]]:
+def _with_bounds(candidates: Candidates, chosen: Sequence[Trial]) -> list[list[Recording]]:
     """Recordings by policy, with lower bounds if the oracle is asked."""
     runs = [list(run) for run in zip(*chosen, strict=True)]
-    if candidates.faced is None or not oracle:
+    if candidates.bounded is None:
         return runs
     numbers = [recording.trial for recording in runs[0]]
-    bounds = oracle_bounds(candidates.faced.chosen(numbers)).steps_lower_bound.tolist()
+    bounds = oracle_bounds(candidates.bounded.chosen(numbers)).steps_lower_bound.tolist()
     return [
         [replace(each, steps_lower_bound=n) for each, n in zip(run, bounds, strict=True)]
         for run in runs
     ]
 
 
-def _failures(candidates: Candidates, *, oracle: bool) -> Chosen:
+def _failures(candidates: Candidates) -> Chosen:
     """All trials that failed, in groups by cause, beside the oracle."""
     first, total = [trial[0] for trial in candidates.trials], len(candidates.trials)
     ends = zip(*((each.outcome, each.steps, each.contact) for each in first), strict=True)
@@ -203,10 +199,10 @@ def _failures(candidates: Candidates, *, oracle: bool) -> Chosen:
     frequency = Counter(causes)
     order = sorted(range(len(causes)), key=lambda k: (-frequency[causes[k]], causes[k]))
     trials = [candidates.trials[failed[k]] for k in order]
-    runs = _with_bounds(candidates, trials, oracle=oracle)
-    if oracle and len(runs) == 1 and candidates.faced is not None:
+    runs = _with_bounds(candidates, trials)
+    if len(runs) == 1 and candidates.bounded is not None:
         numbers = [recording.trial for recording in runs[0]]
-        ghosts = record(ORACLE, candidates.faced.chosen(numbers), allow_other_arm=True)
+        ghosts = record(ORACLE, candidates.bounded.chosen(numbers), allow_other_arm=True)
         runs.append([replace(each, trial=numbers[each.trial]) for each in ghosts])
     policy, problem = first[0].policy, first[0].problem.name
     heading = f"{policy}: {len(causes)} of {total} trials of {problem} failed"
