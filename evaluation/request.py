@@ -132,6 +132,12 @@ class EvaluationRequest(ProblemOptions, TableOptions):
         if self.json and self.columns:
             raise InvalidInputError("--columns is for tables, and --json prints the whole document")
 
+    @property
+    def files(self) -> list[Path]:
+        """Files that are written."""
+        places = ((self.out, DOCUMENT), (self.report, REPORT))
+        return [folder / name for folder, name in places if folder is not None]
+
     def run(self, command: str | None = None, tell: Tell = lambda _: None) -> "EvaluationDocument":
         """Evaluate, and write the outputs.
 
@@ -141,7 +147,7 @@ class EvaluationRequest(ProblemOptions, TableOptions):
 
         pairs = self._checked_pairs()
         with ExitStack() as locks:
-            for folder in {absolute(each) for each in (self.out, self.report) if each}:
+            for folder in {absolute(path.parent) for path in self.files}:
                 locks.enter_context(only_writer(folder))
             evaluations = self._face(pairs, tell)
             document = evaluation_document(
@@ -149,7 +155,13 @@ class EvaluationRequest(ProblemOptions, TableOptions):
                 repr(self) if command is None else command,
                 next(iter(self.policies), ""),
             )
-            self._write(document, evaluations, tell)
+            if self.report is not None:
+                from kinarm.evaluation.report.page import write_report
+
+                tell("writing the report")
+                write_report(self.report, document, evaluations)
+            if self.out is not None:
+                write_text(self.out / DOCUMENT, json.dumps(document.to_json(), indent=1) + "\n")
         return document
 
     def evaluate(self, tell: Tell = lambda _: None) -> "list[Evaluation]":
@@ -189,18 +201,6 @@ class EvaluationRequest(ProblemOptions, TableOptions):
             ]
         return evaluations
 
-    def _write(
-        self, document: "EvaluationDocument", evaluations: "list[Evaluation]", tell: Tell
-    ) -> None:
-        """Write the outputs."""
-        if self.report is not None:
-            from kinarm.evaluation.report.page import write_report
-
-            tell("writing the report")
-            write_report(self.report, document, evaluations)
-        if self.out is not None:
-            write_text(self.out / DOCUMENT, json.dumps(document.to_json(), indent=1) + "\n")
-
     def _checked_pairs(self) -> "list[Pair]":
         """Who faces which problem, after checks of policies and files."""
         from kinarm.evaluation.selection import select_pairs
@@ -215,9 +215,6 @@ class EvaluationRequest(ProblemOptions, TableOptions):
         for contestant, problem in pairs:
             arm = arms[problem.name]
             contestant.check(problem, arm, allow_other_arm=self.allow_other_arm)
-        written = [self.report / REPORT] if self.report else []
-        if self.out is not None:
-            written.append(self.out / DOCUMENT)
-        for path in written:
+        for path in self.files:
             check_output(path, overwrite=self.overwrite)
         return pairs

@@ -43,21 +43,17 @@ class BenchmarkRequest(Checked):
         return measure(self.policy, self.repetitions, ppo=self.ppo)
 
 
-def speed_page(document: dict[str, Any]) -> str:
-    """Everything that was measured, in one table of Markdown."""
-    return template_environment().get_template("speed.md").render({"ppo_training": {}, **document})
-
-
 def _report(request: BenchmarkRequest, command: str) -> None:
-    """Run a request, and print its figures."""
+    """Run a request, and print its figures in one table."""
     from rich.markdown import Markdown
 
     document = {"command": command, **request.run()}
     if request.json:
         print(json.dumps(document))
         return
-    _, _, page = speed_page(document).partition("\n\n")
-    open_console().print(Markdown(page))
+    template = template_environment().get_template("speed.md")
+    _, _, table = template.render({"ppo_training": {}, **document}).partition("\n\n")
+    open_console().print(Markdown(table))
 
 
 main = partial(run_request, "kinarm-bench", BenchmarkRequest, _report)
