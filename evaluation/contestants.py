@@ -208,9 +208,10 @@ class Contestant:
                 f"{name!r} is neither a function of observations nor has a method predict: "
                 f"it is {function!r}"
             )
-        actor = Actor.of(function)
-        origin = "VecNormalize of its environment" if actor.statistics is not None else None
+        statistics = getattr(function, "get_vec_normalize_env", lambda: None)()
+        origin = "VecNormalize of its environment" if statistics is not None else None
         remark = normalization_remark({"vec_normalize": origin})
+        actor = Actor(function, statistics)
         return cls.from_actor(name, actor, algorithm="function", remarks=(remark,))
 
     @classmethod

@@ -20,6 +20,9 @@ from kinarm.policies.policy import Policy
 from kinarm.policies.provenance import normalization_remark
 from kinarm.problem import ProblemLike
 
+IMPORT_PATH = re.compile(r"[A-Za-z_][\w.]*:[A-Za-z_]\w*")
+"""The form ``module:function``."""
+
 
 def find_contestants(
     name_or_file: str | Path,
@@ -58,8 +61,8 @@ def find_contestants(
     elif models:
         settings, wrapped = (problem, vec_normalize), wrapper is not None
         found = tuple(_model_contestant(path, *settings, wrapped=wrapped) for path in models)
-    elif is_import_path(text):
-        found = (_imported_contestant(text),)
+    elif IMPORT_PATH.fullmatch(text):
+        found = (_entered(text, _imported(text, "policy")),)
     else:
         found = _policy_contestants(name_or_file)
     if wrapper is None:
@@ -72,8 +75,18 @@ def find_contestants(
     return tuple(each.in_wrapper(function, wrapper) for each in found)
 
 
+def _entered(name: str, policy: Policy | PolicyFunction | Predictor) -> Contestant:
+    """Enter a policy, or a function, under a name."""
+    if isinstance(policy, Policy):
+        return Contestant.from_policy(name, policy)
+    return Contestant.from_function(name, policy)
+
+
 def _name_of(function: Any) -> str:
-    """What a function, or an object that is used as one, is called."""
+    """What a policy, a function, or an object that is used as one, is called."""
+    if isinstance(function, Policy):
+        made = function.provenance
+        return f"{made.algorithm}-{made.recipe}-{function.problem.name}"
     return getattr(function, "__name__", None) or type(function).__name__
 
 
@@ -108,14 +121,7 @@ def contestant_of(
         return find_contestants(policy, problem, wrapper=wrapper)[0]
     if wrapper is not None:
         return contestant_of(policy, problem).in_wrapper(wrapper, _name_of(wrapper))
-    if isinstance(policy, Contestant):
-        return policy
-    if isinstance(policy, Policy):
-        made = policy.provenance
-        return Contestant.from_policy(
-            f"{made.algorithm}-{made.recipe}-{policy.problem.name}", policy
-        )
-    return Contestant.from_function(_name_of(policy), policy)
+    return policy if isinstance(policy, Contestant) else _entered(_name_of(policy), policy)
 
 
 def _model_contestant(
@@ -139,19 +145,6 @@ def _model_contestant(
         source=path.resolve(),
         remarks=(normalization_remark({"vec_normalize": origin}),),
     )
-
-
-def is_import_path(text: str) -> bool:
-    """Whether a text has the form ``module:function``."""
-    return re.fullmatch(r"[A-Za-z_][\w.]*:[A-Za-z_]\w*", text) is not None
-
-
-def _imported_contestant(name: str) -> Contestant:
-    """A policy or function of a module."""
-    found = _imported(name, "policy")
-    if isinstance(found, Policy):
-        return Contestant.from_policy(name, found)
-    return Contestant.from_function(name, found)
 
 
 def _imported(name: str, kind: str) -> Any:

@@ -37,11 +37,6 @@ class Actor:
     policy: Any
     statistics: Any = None
 
-    @classmethod
-    def of(cls, policy: Any) -> "Actor":
-        """Take a policy with the statistics of its environment, if it has some."""
-        return cls(policy, getattr(policy, "get_vec_normalize_env", lambda: None)())
-
     @cached_property
     def _options(self) -> set[str]:
         """Which of its arguments ``predict`` takes."""
