@@ -131,7 +131,7 @@ def _failures(members: Iterable[Evaluation]) -> list[list[Any]]:
     counts: Counter[str] = Counter()
     first: dict[str, tuple[str, int]] = {}
     for each in members:
-        ends = (each.outcomes, each.rollouts.steps.tolist(), each.contacts)
+        ends = (each.rollouts.outcomes, each.rollouts.steps.tolist(), each.contacts)
         for trial, cause in failure_causes(*ends).items():
             counts[str(cause)] += 1
             first.setdefault(str(cause), (each.contestant.name, trial))

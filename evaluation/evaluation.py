@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import msgspec
 import numpy as np
 
-from kinarm.episodes import Outcome, Rollouts
+from kinarm.episodes import Rollouts
 from kinarm.errors import InvalidInputError
 from kinarm.evaluation.bounds import MOST_BOUNDED, oracle_bounds
 from kinarm.evaluation.contestants import Contestant, Predictor, measure_holding
@@ -102,18 +102,13 @@ class Evaluation:
         return estimate_metrics(outcomes_of(self.members), outcomes_of(other.members))
 
     @property
-    def outcomes(self) -> tuple[Outcome, ...]:
-        """``"success"``, ``"collision"`` or ``"truncated"``, per trial."""
-        return self.rollouts.outcomes
-
-    @property
     def result(self) -> Result:
         """Figures of merit and every trial, for a document."""
         rollouts, holding = self.rollouts, self.holding
         ends = TrialEnds(
             final_distance=rollouts.distance.tolist(),
             steps=rollouts.steps.tolist(),
-            outcome=list(self.outcomes),
+            outcome=list(rollouts.outcomes),
             contact=list(self.contacts),
         )
         held = holding and TrialHolding(
@@ -153,7 +148,7 @@ def common_figures(name: str, evaluations: Sequence[Evaluation]) -> dict[str, An
     """Fields of a row, with causes of failure, the most frequent first."""
     contestant, trials = evaluations[0].contestant, evaluations[0].trials
     causes = (
-        failure_causes(each.outcomes, each.rollouts.steps.tolist(), each.contacts)
+        failure_causes(each.rollouts.outcomes, each.rollouts.steps.tolist(), each.contacts)
         for each in evaluations
     )
     counts = Counter(cause for each in causes for cause in each.values())
@@ -225,8 +220,7 @@ def evaluate(
     if faced is None:
         raise InvalidInputError(f"{contestant.name!r} was not trained for a problem: name one")
     drawn = TrialSet.draw(ReachProblem.load(faced).replace(**overrides), trials, seed)
-    simulator = drawn.simulator
-    contestant.check(simulator.problem, simulator.arm, allow_other_arm=allow_other_arm)
+    contestant.check(drawn.problem, drawn.simulator.arm, allow_other_arm=allow_other_arm)
     bounds = oracle_bounds(drawn.first(MOST_BOUNDED)) if oracle else None
     return run_trials(contestant, drawn, bounds=bounds, hold=hold)
 

@@ -288,7 +288,7 @@ METRICS: dict[str, Metric] = {
     "median_approach": _distance(
         meaning=f"median of the {APPROACH}",
         definition="median of aᵢ",
-        formula=lambda trials: np.median(trials.ordered_closest, axis=-1),
+        formula=lambda trials: np.median(trials.closest, axis=-1),
         needs_holding=True,
         heading="median approach m",
         beside=("p95_approach", "p95 {}"),
@@ -297,7 +297,7 @@ METRICS: dict[str, Metric] = {
     "p95_approach": _distance(
         meaning=f"95th percentile of the {APPROACH}",
         definition="0.95 quantile of aᵢ, interpolated linearly",
-        formula=lambda trials: np.quantile(trials.ordered_closest, 0.95, axis=-1),
+        formula=lambda trials: np.quantile(trials.closest, 0.95, axis=-1),
         needs_holding=True,
     ),
     "held_collision": _share_of(

@@ -129,11 +129,6 @@ class Outcomes:
         """Final distances along the last axis, the smallest first [m]."""
         return np.sort(self.distance, axis=-1)
 
-    @cached_property
-    def ordered_closest(self) -> NDArray[np.float64]:
-        """Closest approaches along the last axis, the smallest first [m]."""
-        return np.sort(self.closest, axis=-1)
-
     @property
     def goals_per_minute(self) -> float | None:
         """Goals of sequences that were reached, per minute."""

@@ -3,7 +3,7 @@
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, ClassVar
+from typing import ClassVar
 
 from kinarm._command_line import Commands, run_commands
 from kinarm._console import open_console
@@ -16,9 +16,6 @@ from kinarm.problem import ReachProblem
 from kinarm.problem_files import problem_names
 from kinarm.problem_options import ProblemOptions, say_choices
 from kinarm.scene import Mount
-
-if TYPE_CHECKING:
-    from kinarm.evaluation.problem_check import ProblemCheck
 
 HEADINGS = ("problem", "arm", "obstacles", "goals", "step [s]", "tolerance [m]")
 EXPENDABLE = ("obstacles", "step [s]", "tolerance [m]")
@@ -64,21 +61,6 @@ class CheckRequest(ShowRequest):
     seed: int = field(default=0, metadata=FROM_ZERO)
 
     GROUPS: ClassVar = {"what is checked": "trials seed", **ProblemOptions.GROUPS}
-
-    def run(self) -> "ProblemCheck":
-        """Check the problem."""
-        from kinarm.evaluation.problem_check import check_problem
-        from kinarm.world import World
-
-        problem = self.resolve()
-        say_choices([problem])
-        with open_console(stderr=True).status("checking") as status:
-            return check_problem(
-                World(problem),
-                self.trials,
-                self.seed,
-                lambda done, total: status.update(f"{done} of {total} trials solved"),
-            )
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -128,7 +110,18 @@ def rows() -> list[tuple[str, ...]]:
 
 
 def _check(request: CheckRequest) -> None:
-    check, problem = request.run(), request.resolve()
+    from kinarm.evaluation.problem_check import check_problem
+    from kinarm.world import World
+
+    problem = request.resolve()
+    say_choices([problem])
+    with open_console(stderr=True).status("checking") as status:
+        check = check_problem(
+            World(problem),
+            request.trials,
+            request.seed,
+            lambda done, total: status.update(f"{done} of {total} trials solved"),
+        )
     goals = " and ".join(problem.task.goal_regions)
     print(f"{problem.name}: arm {problem.arm.name}, goals {goals}")
     print(check)

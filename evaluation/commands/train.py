@@ -27,8 +27,6 @@ PROG = "kinarm-train"
 CIRCUMSTANCES = ("problem", "seed", "recipe", "algorithm")
 """Settings with a field of `TrainRequest`, or determined by the learner."""
 
-SETTINGS = "settings of the learner (defaults of the recipe {})"
-
 MOST_SEEDS = 1000
 
 TRAININGS = ".training"
@@ -194,8 +192,8 @@ def _add_learner(
     recipes = {"recipe": tuple(learner.recipes)}
     add_options(parser, TrainRequest, skip=("learner", "settings"), names=recipes)
     add_options(parser, SeedsRequest, skip=("training",))
-    settings = parser.add_argument_group(SETTINGS.format(learner.first_recipe))
-    add_options(settings, learner.config, skip=CIRCUMSTANCES, explicit=True)
+    title = f"settings of the learner (defaults of the recipe {learner.first_recipe})"
+    add_options(parser.add_argument_group(title), learner.config, skip=CIRCUMSTANCES, explicit=True)
 
 
 def _epilog(name: str, learner: Learner[Any, Any]) -> str:

@@ -73,10 +73,8 @@ def carry_out_search(experiment: Experiment, store: Store, jobs: int, train_all:
         if trial.state.name == "RUNNING":
             search.tell(trial.number, state=type(trial.state).FAIL)
             search.enqueue_trial(trial.params)
-    while failed < FAILURES:
-        missing = experiment.search["count"] - len(_complete(search))
-        if missing <= 0:
-            break
+    count = experiment.search["count"]
+    while failed < FAILURES and (missing := count - len(_complete(search))) > 0:
         failed += _try_settings(experiment, search, store, min(jobs, missing), train_all)
     if _complete(search):
         best = plan(experiment, [_choices(experiment, search.best_trial)])[0]

@@ -23,7 +23,7 @@ from kinarm.evaluation.experiments.plan import Run, plan
 from kinarm.evaluation.experiments.runs import Task, TaskResult, TrainedRun, load_policy, train
 from kinarm.evaluation.experiments.search import carry_out_search, searched_runs
 from kinarm.evaluation.experiments.store import SPECIFICATION, Store
-from kinarm.evaluation.experiments.table import Group, figures_of, identity, shorter, shown
+from kinarm.evaluation.experiments.table import Group, figures_of, identity, shown
 from kinarm.evaluation.outcomes import Outcomes
 from kinarm.evaluation.trials import trial_set
 from kinarm.policies.checkpoint import CHECKPOINT_SECONDS
@@ -215,12 +215,12 @@ class Study:
         remain = [run for run in self.runs if not self.store.path("runs", run).exists()]
         finished = len(self.runs) - len(remain)
         told = [f"{self.experiment.name}: {finished} of {len(self.runs)} trainings finished"]
-        told[0] = ", ".join((told[0], *self._under_way(remain)[1]))
-        if remain and is_being_written(self.store.folder):
-            told[0] += ", running"
-        elif remain:
-            told[0] += ", stopped; the command that made it goes on"
-        return told + [f"failed: {run.name}: {error}" for run, error in self.failures.items()]
+        told += self._under_way(remain)[1]
+        if remain:
+            runs = is_being_written(self.store.folder)
+            told.append("running" if runs else "stopped; the command that made it goes on")
+        failed = (f"failed: {run.name}: {error}" for run, error in self.failures.items())
+        return [", ".join(told), *failed]
 
     @cached_property
     def finished(self) -> Mapping[Run, TrainedRun]:
@@ -298,7 +298,8 @@ class Study:
             parts = [str(names[name]) for name, values in several.items() if len(values) > 1]
         if len({each.config.problem.name for each in self.runs}) > 1:
             parts.append(names["problem"])
-        parts += [f"{shorter(field)}={shown(value)}" for field, value in run.choices.items()]
+        for field, value in run.choices.items():
+            parts.append(f"{field.rpartition('.')[2]}={shown(value)}")
         return " ".join(parts) or f"{names['learner']} {names['recipe']} {names['problem']}"
 
     @property

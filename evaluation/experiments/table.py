@@ -84,9 +84,14 @@ class Group:
         return (self.success.value or 0.0) / max(self.reachable, 1e-9)
 
     @cached_property
-    def figures(self) -> dict[str, float]:
-        """The figures of merit over all seeds; NaN for unknown ones."""
-        return figures_of(Outcomes(tuple(run.outcomes for run in self.runs), self.bounds))
+    def estimates(self) -> dict[str, Estimate]:
+        """The figures of merit over all seeds; success has an interval."""
+        outcomes = Outcomes(tuple(run.outcomes for run in self.runs), self.bounds)
+        known = {
+            name: Estimate(None if math.isnan(value) else value)
+            for name, value in figures_of(outcomes).items()
+        }
+        return {**known, "success": self.success}
 
     @property
     def worst_seed(self) -> float:
@@ -149,11 +154,6 @@ def identity(run: Run) -> dict[str, Any]:
     }
 
 
-def shorter(field: str) -> str:
-    """The last name of a path."""
-    return field.rpartition(".")[2]
-
-
 def shown(value: Any) -> str:
     """A value in a label or a table."""
     if isinstance(value, float):
@@ -165,15 +165,6 @@ def shown(value: Any) -> str:
 
 LEVELS = (0.5, 0.8)
 """Shares of success that measure the speed of learning."""
-
-
-def _estimates(group: Group) -> dict[str, Estimate]:
-    """Figures of merit by metric; success has an interval."""
-    known = {
-        name: Estimate(None if math.isnan(value) else value)
-        for name, value in group.figures.items()
-    }
-    return {**known, "success": group.success}
 
 
 def _until_column(level: float) -> Column[Group]:
@@ -203,7 +194,7 @@ def _number_column(
 COLUMNS: tuple[Column[Group], ...] = (
     Column("trainings", attrgetter("label"), priority=ALWAYS, words=True),
     Column("seeds", lambda group: len(group.runs), priority=SEEDS_PRIORITY),
-    *(metric_column(name, _estimates) for name in FIGURES[:1]),
+    *(metric_column(name, attrgetter("estimates")) for name in FIGURES[:1]),
     Column(
         "less first %",
         lambda group: difference_cell("success", group.difference),
@@ -211,7 +202,7 @@ COLUMNS: tuple[Column[Group], ...] = (
         "success less that of the first trainings of the problem, in the same trials",
         priority=9.5,
     ),
-    *(metric_column(name, _estimates) for name in FIGURES[1:]),
+    *(metric_column(name, attrgetter("estimates")) for name in FIGURES[1:]),
     _number_column("worst seed %", "worst_seed", attrgetter("worst_seed"), 0.01, 10.5),
     _number_column("million steps", "environment_steps", attrgetter("environment_steps"), 1e6, 9),
     _number_column("minutes", "processor_seconds", attrgetter("processor_seconds"), 60, 9),

@@ -3,9 +3,10 @@
 import pytest
 from refusals import check_refused
 
-from kinarm.evaluation.commands.problem import CheckRequest
+from kinarm.evaluation.problem_check import check_problem
 from kinarm.problem import PROBLEMS, ReachProblem
 from kinarm.problem_files import problem_names
+from kinarm.world import World
 
 FAR = """
 [[goal_regions]]
@@ -60,7 +61,7 @@ def test_check_says_what_is_out_of_reach(run, write):
     path = write(f'arm = "paper"\nscene = "{write(FAR, "scene.toml")}"\n')
     answer = run("kinarm-problem", "check", path, "--trials", 30)
     assert (answer.status, answer.err) == (0, "")
-    check = CheckRequest(problem=str(path), trials=30).run()
+    check = check_problem(World(path), trials=30)
     assert str(check) in answer.out
     assert check.undecided.value == 0
     assert check.reached.value + check.out_of_reach.value == pytest.approx(1)

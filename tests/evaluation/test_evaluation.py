@@ -17,7 +17,7 @@ from kinarm.policies.oracle import Oracle
 
 def test_figures_are_those_of_the_episodes(skilled_evaluation):
     distance = np.array(skilled_evaluation.rollouts.distance)
-    outcomes = skilled_evaluation.outcomes
+    outcomes = skilled_evaluation.rollouts.outcomes
     document = skilled_evaluation.result.to_json()
     figures = {name: entry["value"] for name, entry in document["metrics"].items()}
     assert document["trials"] == 60
@@ -40,7 +40,7 @@ def test_the_still_baseline_never_moves():
     evaluation = evaluate("zero", "both", trials=30, seed=2)
     rollouts, arm = evaluation.rollouts, Arm.load()
     np.testing.assert_array_equal(rollouts.configurations, evaluation.trials.starts)
-    assert set(evaluation.outcomes) == {"truncated"}
+    assert set(evaluation.rollouts.outcomes) == {"truncated"}
     assert (rollouts.steps == 64).all()
     tools = np.array([arm.tool_position(start) for start in evaluation.trials.starts])
     expected = np.linalg.norm(tools - evaluation.trials.goals, axis=1)

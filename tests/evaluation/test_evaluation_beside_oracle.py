@@ -37,7 +37,7 @@ def test_step_ratio_is_that_of_the_trials_that_succeeded(bounded):
 def test_relative_success_is_the_ratio_of_two_rates(bounded, reached):
     reachable = np.isin(np.arange(60), list(reached))
     made = replace(bounded, bounds=replace(bounded.bounds, reachable=reachable))
-    successes, possible = bounded.outcomes.count("success"), len(reached)
+    successes, possible = bounded.rollouts.outcomes.count("success"), len(reached)
     relative = made.metrics["relative_success"].value
     assert relative == pytest.approx((successes / 60) / (possible / 60))
 

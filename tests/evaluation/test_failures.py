@@ -47,7 +47,7 @@ def test_shares_of_trials_are_those_of_the_causes(evaluations):
         early = sum(each["trials"] for each in row["failures"] if each["early"])
         assert metrics["early_collision"].value == early / row["trials"]
         late = metrics["collision"].value - metrics["early_collision"].value
-        truncated = np.mean([outcome == "truncated" for outcome in evaluation.outcomes])
+        truncated = np.mean([outcome == "truncated" for outcome in evaluation.rollouts.outcomes])
         assert metrics["truncated"].value == truncated
         assert metrics["success"].value + early / row["trials"] + late + truncated == pytest.approx(
             1

@@ -18,7 +18,7 @@ def test_they_end_as_the_evaluation(trials, skilled, name):
     )
     evaluation = run_trials(contestant, trials)
     recordings = record(contestant, trials)
-    assert [each.outcome for each in recordings] == list(evaluation.outcomes)
+    assert [each.outcome for each in recordings] == list(evaluation.rollouts.outcomes)
     assert [each.steps for each in recordings] == evaluation.rollouts.steps.tolist()
     assert [each.final_distance for each in recordings] == evaluation.rollouts.distance.tolist()
     assert [each.contact for each in recordings] == list(evaluation.contacts)

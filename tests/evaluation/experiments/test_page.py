@@ -51,7 +51,7 @@ class TestGroups:
         assert [group.hits.shape for group in groups] == [(2, 12)] * 2
         for group in groups:
             assert group.success.value == group.hits.mean()
-            assert group.figures["success"] == group.hits.mean()
+            assert group.estimates["success"].value == group.hits.mean()
 
     def test_each_is_compared_with_the_first(self, finished):
         first, second = finished.groups()

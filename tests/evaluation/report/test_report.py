@@ -85,7 +85,7 @@ class TestWorst:
                 trial,
             )
             assert recording.final_distance == evaluation.rollouts.distance[trial]
-            assert recording.outcome == evaluation.outcomes[trial]
+            assert recording.outcome == evaluation.rollouts.outcomes[trial]
 
 
 class TestPage:
