@@ -68,11 +68,10 @@ def write_resolved_rate(session: Session, seen: Seen, start: int, count: int) ->
 
     It starts from joint positions as they were commanded, to which a step is added.
     """
-    if session.block.newton.shape[0] > 0:
-        if session.block.plant.shape[0] > 0:
-            _resolve(session, _as_commanded(session, seen), start, count)
-        else:
-            _resolve(session, seen, start, count)
+    if session.block.plant.shape[0] > 0:
+        _resolve(session, _as_commanded(session, seen), start, count)
+    else:
+        _resolve(session, seen, start, count)
 
 
 @inlined
@@ -91,7 +90,7 @@ def _as_commanded(session: Session, seen: Seen) -> Seen:
 
 @inlined
 def _resolve(session: Session, seen: Seen, start: int, count: int) -> None:
-    """The same, where there is work space for it."""
+    """The same, from what is given as seen."""
     block, goal, limit = session.block, session.rules.goal, session.rules.step_limit
     step, longest = block.newton[0], 1.0 + 0.0 * seen.tool[0]
     if goal.kind == CONFIGURATION:
