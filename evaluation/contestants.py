@@ -68,8 +68,9 @@ class Contestant:
         What chooses its actions in Python, to run in a wrapper.
     remarks : tuple of str
         What its figures assume: a wrapper, statistics of observations.
-    has_shield : bool
-        Whether steps that would touch are replaced.
+    has_shield, wrapped : bool
+        Whether steps that would touch are replaced, and whether it runs in a
+        wrapper.
     """
 
     name: str
@@ -82,6 +83,7 @@ class Contestant:
     actor: Actor | None = None
     remarks: tuple[str, ...] = ()
     has_shield: bool = False
+    wrapped: bool = False
 
     def shielded(self) -> "Contestant":
         """The same behind a shield (``kinarm.shield``), under a name of its own.
@@ -224,17 +226,15 @@ class Contestant:
             run = partial(_run, actor.policy if plain else actor.actions)
         return cls(name, run, **{"recipe": "", "actor": actor, **about})
 
-    @property
-    def wrapped(self) -> bool:
-        """Whether it runs in a wrapper."""
-        return isinstance(self.run, partial) and self.run.func is run_wrapped
-
     def in_wrapper(self, wrapper: Wrapper, name: str) -> "Contestant":
         """The same policy in a wrapper, with its name; baselines need none."""
         if self.actor is None:
             return self
         remarks = (*self.remarks, f"in wrapper {name}")
-        return replace(self, run=partial(run_wrapped, self.actor, wrapper), remarks=remarks)
+        run = partial(run_wrapped, self.actor, wrapper)
+        if self.has_shield:
+            run = partial(_run_shielded, run)
+        return replace(self, run=run, remarks=remarks, wrapped=True)
 
 
 def _run(actor: Policy | PolicyFunction, trials: TrialSet, *, record: bool = False) -> Rollouts:

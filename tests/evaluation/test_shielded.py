@@ -4,9 +4,10 @@ import numpy as np
 import pytest
 
 from kinarm import PROBLEMS, ReachProblem, Simulator
+from kinarm.errors import PolicyFileError
 from kinarm.evaluation import EvaluationRequest, ReplayRequest, evaluate
 from kinarm.evaluation.commands.replay import described
-from kinarm.evaluation.finding import find_contestants
+from kinarm.evaluation.finding import contestant_of, find_contestants
 from kinarm.evaluation.selection import group_names
 from kinarm.policies import Policy, PPOConfig, load_policy, train_policy
 from kinarm.recording import load_recordings, record_rollouts, save_recordings
@@ -39,6 +40,20 @@ def test_it_has_a_name_and_a_group_of_its_own(policy):
     names = group_names((*shielded, *find_contestants("ars-linear-both")))
     assert set(names.values()) == {"ars-linear-both", "ars-linear-both+shield"}
     assert shielded[0].shielded() is shielded[0]
+
+
+def test_wrappers_and_shields_go_together(policy):
+    expected = evaluate(policy.shielded(), trials=100)
+    assert expected.rollouts.interventions.sum() > 0
+    found = evaluate(policy.shielded(), trials=100, wrapper=lambda env: env)
+    ends = (each.rollouts.configurations for each in (found, expected))
+    np.testing.assert_allclose(*ends, rtol=0, atol=1e-9)
+    assert found.rollouts.interventions.sum() == expected.rollouts.interventions.sum()
+    # A wrapper may show what the policy sees, and the problem does not.
+    problem, arm = policy.problem.replace(goal={"kind": "direction"}), Simulator("both").arm
+    contestant_of(policy, problem, wrapper=lambda env: env).shielded().check(problem, arm)
+    with pytest.raises(PolicyFileError, match="sees other observations"):
+        contestant_of(policy, problem).shielded().check(problem, arm)
 
 
 def test_what_learnt_behind_a_shield_keeps_it_and_is_shown_without_it_too(tmp_path):
