@@ -234,12 +234,6 @@ class ReachProblem(Checked):
         goals = {"goal_regions": other.task.goal_regions, "goal_weights": other.task.goal_weights}
         return wider and self.replace(**goals).first_difference(other) is None
 
-    def check_same(self, other: "ReachProblem", what: str) -> None:
-        """Refuse another problem, that of ``what``, by the first difference."""
-        difference = self.first_difference(other)
-        if difference is not None:
-            raise ProblemError(f"{what} is of another problem: {difference}")
-
     def to_json(self) -> dict[str, Any]:
         """As a dictionary for JSON, without loss."""
         entries: dict[str, Any] = to_plain(self)

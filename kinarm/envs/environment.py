@@ -105,25 +105,7 @@ def bounded_space(bounds: tuple[Array, Array], dtype: np.dtype[Any]) -> Space[An
     return Box(lower, upper, dtype=dtype.type)
 
 
-class Lifecycle:
-    """An environment that refuses use before a reset."""
-
-    _episodes: Episodes | None = None
-
-    @property
-    def episodes(self) -> Episodes:
-        """The episodes, one row per arm; refused before a reset."""
-        if self._episodes is None:
-            raise InvalidInputError("the environment was never begun: call reset()")
-        return self._episodes
-
-    @property
-    def configuration(self) -> Array:
-        """A copy of the joint positions, shape (n, n_joints) [rad or m]."""
-        return self.episodes.q.copy()
-
-
-class ArmEnvironment(Lifecycle):
+class ArmEnvironment:
     """The common part of Gymnasium's environments of one arm and of many.
 
     Attributes
@@ -136,7 +118,9 @@ class ArmEnvironment(Lifecycle):
 
     simulator: Simulator
     interface: Interface
+    interface_kind: type[Interface] = Interface
     metadata: dict[str, Any] = {"render_modes": list(RENDER_MODES), "render_fps": 50}  # noqa: RUF012  (as Gymnasium declares it)
+    _episodes: Episodes | None = None
 
     def _set_up(
         self,
@@ -159,7 +143,7 @@ class ArmEnvironment(Lifecycle):
             ) from error
         self.simulator = simulator = Simulator(changed, threads=threads)
         self.render_mode = render_mode
-        self.interface = self._make_interface(simulator, dtype)
+        self.interface = self.interface_kind(simulator, dtype)
         self.metadata = self.interface.metadata
         terms = simulator.task.reward.terms if self.interface.tells_terms else ()
         told = (*simulator.task.goal.told, *(f"reward_{name}" for name in terms))
@@ -207,8 +191,17 @@ class ArmEnvironment(Lifecycle):
             else:
                 contact[row] = 1 + index
 
-    def _make_interface(self, simulator: Simulator, dtype: DTypeLike) -> Interface:
-        return Interface(simulator, dtype)
+    @property
+    def episodes(self) -> Episodes:
+        """The episodes, one row per arm; refused before a reset."""
+        if self._episodes is None:
+            raise InvalidInputError("the environment was never begun: call reset()")
+        return self._episodes
+
+    @property
+    def configuration(self) -> Array:
+        """A copy of the joint positions, shape (n, n_joints) [rad or m]."""
+        return self.episodes.q.copy()
 
     @cached_property
     def contact_names(self) -> tuple[tuple[str, str] | None, ...]:

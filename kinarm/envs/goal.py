@@ -152,8 +152,7 @@ class GoalInterface(GoalRewards, Interface):
 class GoalEnvironment(GoalRewards, ArmEnvironment):
     """An environment with a `GoalInterface`."""
 
-    def _make_interface(self, simulator: Simulator, dtype: DTypeLike) -> GoalInterface:
-        return GoalInterface(simulator, dtype)
+    interface_kind = GoalInterface
 
 
 class ReachGoalEnv(GoalEnvironment, ReachEnv):

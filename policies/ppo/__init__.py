@@ -157,11 +157,6 @@ class PPOConfig(TrainingConfig):
         return self.n_envs * self.n_steps
 
     @property
-    def environment_steps(self) -> int:
-        """Environment steps of the whole training."""
-        return self.iterations * self.steps_per_iteration
-
-    @property
     def training_problem(self) -> ReachProblem:
         """The problem with the reward, the tolerance and the stop of these settings."""
         stop = {"hold": self.training_hold, "speed": self.training_speed}

@@ -134,12 +134,8 @@ DIGESTS = {"left": "f2f15f20aef49890", "right": "8691666825bbd7d7", "both": "8f6
 class TestComparison:
     @pytest.mark.parametrize(("field", "changes"), CHANGES.items())
     def test_first_difference_names_the_field(self, field, changes):
-        other = RIGHT.replace(**changes)
-        difference = RIGHT.first_difference(other)
+        difference = RIGHT.first_difference(RIGHT.replace(**changes))
         assert difference.startswith(f"{field} is ")
-        with pytest.raises(ProblemError) as caught:
-            RIGHT.check_same(other, "policy 'a.npz'")
-        assert str(caught.value) == f"policy 'a.npz' is of another problem: {difference}"
 
     @pytest.mark.parametrize(
         ("changes", "difference"),

@@ -63,7 +63,7 @@ def test_weights_replace_those_of_the_task_if_the_recipe_has_none():
 class TestPPO:
     def test_paper_takes_the_papers_steps(self):
         config = recipe("ppo", "paper", problem="both", seed=2)
-        assert config.environment_steps == 1_200_000
+        assert config.iterations * config.steps_per_iteration == 1_200_000
         assert (config.recipe, config.problem, config.seed) == ("paper", PROBLEMS["both"], 2)
 
     def test_paper_has_the_defaults_of_stable_baselines3(self):

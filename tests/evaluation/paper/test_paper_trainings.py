@@ -45,7 +45,7 @@ def test_twelve_models_of_table_1(runs, experiment):
 def test_ppo_takes_the_papers_steps(runs):
     models = literal(runs, "ppo")
     assert Counter(c.problem.name for c in models) == EACH_TASK
-    assert {c.environment_steps for c in models} == {1_200_000}
+    assert {c.iterations * c.steps_per_iteration for c in models} == {1_200_000}
     assert {c.recipe for c in models} == {recipe("ppo", "paper").recipe}
 
 
