@@ -74,7 +74,7 @@ def check_problem(
     scenes = list(_some_scenes(world, q))
     contact = ContactStatistics.sample(world.contact_model, scenes=scenes)
     contact.check_movable(world.arm.name)
-    free_starts = ~world.screened(starts, _some_scenes(world, starts))[1]
+    free_starts = ~world.screen(starts, _some_scenes(world, starts))[1]
     # Goals are reached by the oracle, or proven out of reach within the horizon.
     solutions = oracle_bounds(TrialSet.draw(world.problem, trials, seed), on_progress)
     reached = solutions.reachable

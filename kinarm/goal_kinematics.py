@@ -15,7 +15,7 @@ from kinarm.errors import LARGEST, InvalidInputError, ProblemError, finite_array
 from kinarm.goals import Goals, unit
 from kinarm.inverse_kinematics import SEEDS, InverseKinematics, approach_axis
 from kinarm.kernels.compiling import Array
-from kinarm.kernels.goals import GoalRules, fill_reached
+from kinarm.kernels.goals import GoalRules, errors_between, fill_reached
 from kinarm.kernels.kinematics import POSE
 from kinarm.kernels.records import recorded
 from kinarm.problem import ReachProblem
@@ -195,6 +195,23 @@ class GoalKinematics(InverseKinematics):
         rows, poses = np.empty((len(q), self.goal_width)), np.empty((q.shape[1] + 1, POSE))
         fill_reached(recorded(self.arm.chain), self.rules.goal, q, poses, rows)
         return rows
+
+    def at_goals(self, reached: ArrayLike, goals: ArrayLike) -> Any:
+        """Whether what is reached is within the tolerances of goals.
+
+        Both have the shape (..., goal_width), or one that broadcasts to it, and the answer (...).
+        """
+        pairs = np.broadcast_arrays(np.asarray(reached, float), np.asarray(goals, float))
+        shape, width, task = pairs[0].shape[:-1], self.goal_width, self.problem.task
+        if pairs[0].shape[-1:] != (width,):
+            raise InvalidInputError(
+                f"goals must have the shape (..., {width}), got {pairs[0].shape}"
+            )
+        rows = [np.array(each.reshape(-1, width), order="C") for each in pairs]
+        distances, turns = np.empty((2, len(rows[0])))
+        errors_between(task.goal.number, *rows, distances, turns)
+        near = (distances <= task.tolerance) & (turns <= task.goal.rotation_tolerance)
+        return near.reshape(shape)[()]
 
     def free(self, q: Array, scenes: Array) -> tuple[Array, NDArray[np.bool_]]:
         """Tool points of configurations, and which count as free; see `kinarm.World`."""

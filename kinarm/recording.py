@@ -291,17 +291,14 @@ def record_path(
         if (contact := world.contact(*motion, step=step)) is not None:
             states = np.concatenate([states[: step + 1], states[step : step + 1]])
             break
-    aims, task = np.tile(aim, (len(states), 1)), world.problem.task
-    distances, turns = world.distances(states, aims), world.turns(states[-1:], aims[-1:])
-    turned = bool((turns <= task.goal.rotation_tolerance).all())
-    reached = turned and bool(distances[-1] <= task.tolerance)
+    reached = world.at_goals(world.reached(states[-1:])[0], aim)
     horizon = max(world.problem.task.horizon, len(states) - 1)
     return Recording(
         policy=name,
         problem=world.problem.replace(horizon=horizon).pinned,
         trial=0,
         states=states,
-        distances=distances,
+        distances=world.distances(states, np.tile(aim, (len(states), 1))),
         goal=aim,
         outcome="collision" if contact else "success" if reached else "truncated",
         contact=contact.pair if contact else None,

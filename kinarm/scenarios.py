@@ -9,7 +9,6 @@ from kinarm.episode_scenes import bits_of
 from kinarm.errors import ProblemError, whole_number
 from kinarm.goal_kinematics import SAMPLE
 from kinarm.kernels.compiling import Array
-from kinarm.kernels.goals import errors_between
 from kinarm.world import World
 
 START_ATTEMPTS = 2000
@@ -68,9 +67,7 @@ def draw_for_each(
     starts = np.tile(arm.home, (len(goals), 1))
     pending = np.arange(len(goals))
     for _ in range(START_ATTEMPTS):
-        wanted = [len(pending)]
-        if len(rngs) > 1:
-            wanted = np.bincount(pending // max(count, 1), minlength=len(rngs)).tolist()
+        wanted = np.bincount(pending // max(count, 1), minlength=len(rngs)).tolist()
         uniforms, aims = _draw(rngs, wanted, n_actions), goals[pending]
         if len(listed):
             starts[pending] = listed[(uniforms[:, 0] * len(listed)).astype(np.int64)]
@@ -135,30 +132,15 @@ def draw_followers(world: World, starts: Array, goals: Array) -> Array:
             found, aims = world.solved_goals(aims, uniforms[:, -1], there)
         drawn[pending] = aims
         pending[pending] = ~found
-        pending[:, 1:] |= _close(world, drawn[:, :-1], drawn[:, 1:])
+        pending[:, 1:] |= world.at_goals(drawn[:, :-1], drawn[:, 1:])
     raise ProblemError(f"no goals of a sequence found in {START_ATTEMPTS} attempts")
-
-
-def _close(world: World, goals: Array, others: Array) -> NDArray[np.bool_]:
-    """Whether goals are within the tolerances of others, shape (n, k)."""
-    task, shape = world.problem.task, goals.shape[:2]
-    distances, turns = np.empty(shape), np.empty(shape)
-    reached = np.ascontiguousarray(goals).reshape(-1, goals.shape[2])
-    wanted = np.ascontiguousarray(others).reshape(-1, goals.shape[2])
-    filled = distances.reshape(-1), turns.reshape(-1)
-    errors_between(task.goal.number, reached, wanted, *filled)
-    near: NDArray[np.bool_] = distances <= task.tolerance
-    return near & (turns <= task.goal.rotation_tolerance)
 
 
 def _draw(rngs: Sequence[np.random.Generator], counts: Sequence[int], width: int) -> Array:
     """Draw rows of numbers in [0, 1), so many of each generator."""
-    if len(rngs) == 1:
-        return rngs[0].random((counts[0], width))
     uniforms, first = np.empty((sum(counts), width)), 0
     for rng, count in zip(rngs, counts, strict=True):
-        if count:
-            rng.random(out=uniforms[first : first + count])
+        rng.random(out=uniforms[first : first + count])
         first += count
     return uniforms
 

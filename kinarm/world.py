@@ -141,20 +141,14 @@ class World(GoalKinematics, StepContact):
         """Distances of the tool from goals, shape (n,) [m]; see `observe`."""
         return self._begun_at(configurations, goals).distance
 
-    def turns(self, configurations: ArrayLike, goals: ArrayLike) -> Array:
-        """Errors of the goals' rests, shape (n,) [rad, or rad or m]; empty if they have none."""
-        return self._begun_at(configurations, goals).turn
-
-    def screen(self, configurations: ArrayLike) -> tuple[Array, NDArray[np.bool_]]:
+    def screen(
+        self, configurations: ArrayLike, scenes: Array | None = None
+    ) -> tuple[Array, NDArray[np.bool_]]:
         """Tool points, shape (n, 3) [m], and which configurations touch something, shape (n,).
 
-        Takes joint positions, shape (n, n_joints) [rad or m].
+        Takes joint positions, shape (n, n_joints) [rad or m], perhaps in scenes of `scenes_of`.
         """
         q = finite_array("configurations", configurations, (None, self.arm.n_joints))
-        return self.screened(q)
-
-    def screened(self, q: Array, scenes: Array | None = None) -> tuple[Array, NDArray[np.bool_]]:
-        """`screen` for finite configurations in a contiguous array, in scenes of `scenes_of`."""
         tools, free, touching, n_proven = self.proven(q, scenes)
         if n_proven < len(q):
             doubtful = ~(free | touching)
@@ -165,13 +159,13 @@ class World(GoalKinematics, StepContact):
     def free(self, q: Array, scenes: Array) -> tuple[Array, NDArray[np.bool_]]:
         """Tool points, shape (n, 3) [m], and which configurations count as free in draws.
 
-        Without scenes, Coal decides as in `screened`. In scenes of their own, those are free that
+        Without scenes, Coal decides as in `screen`. In scenes of their own, those are free that
         kernels prove to be: of what these leave open, Coal calls about one in 300 free, and takes
         most of the time.
         """
         if len(scenes):
             return self.proven(q, scenes)[:2]
-        tools, touching = self.screened(q)
+        tools, touching = self.screen(q)
         return tools, ~touching
 
     def proven(

@@ -118,11 +118,11 @@ def check_steps(arm: str, rng: np.random.Generator, size: int) -> Checked:
     refused, free = did.collision, ~did.collision
     shares = np.arange(1, SAMPLES + 1)[:, None] / SAMPLES
     for start, end in zip(did.starts[free], did.configurations[free], strict=True):
-        if world.screened(start + shares * (end - start))[1].any():
+        if world.screen(start + shares * (end - start))[1].any():
             case = {"start": start.tolist(), "end": end.tolist()}
             cases.append({"problem": world.problem.to_json(), **case})
     quarters = substeps(world, did.starts[refused], did.targets[refused])[:, 3::4]
-    seen = [world.screened(way)[1].any() for way in quarters]
+    seen = [world.screen(way)[1].any() for way in quarters]
     return free.sum(), {"refused": len(seen), "unseen by four": seen.count(False)}, cases
 
 

@@ -21,7 +21,6 @@ from kinarm.envs.vector import ReachVectorEnv
 from kinarm.episodes import TRUNCATED, Episodes
 from kinarm.errors import InvalidInputError
 from kinarm.goals import REST_PARTS
-from kinarm.kernels.goals import errors_between
 from kinarm.simulator import Simulator, StepResult
 
 
@@ -63,8 +62,7 @@ class GoalRewards:
         achieved_goal, desired_goal, info
             As for `compute_reward`; infos have no effect.
         """
-        task, (distance, turn) = self.simulator.task, self._errors(achieved_goal, desired_goal)
-        return (distance <= task.tolerance) & (turn <= task.goal.rotation_tolerance)
+        return self.simulator.world.at_goals(achieved_goal, desired_goal)
 
     def compute_truncated(
         self, achieved_goal: ArrayLike, desired_goal: ArrayLike, info: object
@@ -77,20 +75,6 @@ class GoalRewards:
             As for `compute_reward`, without effect.
         """
         return self.compute_terminated(achieved_goal, desired_goal, info) & False
-
-    def _errors(self, achieved: ArrayLike, desired: ArrayLike) -> tuple[Any, Any]:
-        """Distances [m] and turns [rad, or rad or m] of achieved goals from desired ones."""
-        pairs = np.broadcast_arrays(np.asarray(achieved, float), np.asarray(desired, float))
-        shape, width = pairs[0].shape[:-1], self.simulator.world.goal_width
-        if pairs[0].shape[-1:] != (width,):
-            raise InvalidInputError(
-                f"goals must have the shape (..., {width}), got {pairs[0].shape}"
-            )
-        reached, wanted = (np.array(each.reshape(-1, width), order="C") for each in pairs)
-        errors = np.empty((2, len(reached)))
-        errors_between(self.simulator.task.goal.number, reached, wanted, *errors)
-        distance, turn = errors.reshape(2, *shape)
-        return distance[()], turn[()]
 
 
 class GoalInterface(GoalRewards, Interface):

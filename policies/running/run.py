@@ -216,8 +216,7 @@ class Run:
         """What the joints did for a goal; ``ended`` of its provenance says how it ended."""
         world, task, contact = self.simulator.world, self.simulator.task, None
         aims = aims if len(aims) == len(path) else np.tile(goal, (len(path), 1))
-        distances, turns = world.distances(path, aims), world.turns(path[-1:], aims[-1:])
-        there = distances[-1] <= task.tolerance and (turns <= task.goal.rotation_tolerance).all()
+        there = world.at_goals(world.reached(path[-1:])[0], aims[-1])
         outcome: Outcome = "truncated"
         ended = stopped or f"not reached in {len(path) - 1} steps"
         if episodes.status[0] == COLLISION and not stopped:
@@ -232,7 +231,7 @@ class Run:
             problem=self.simulator.problem.pinned,
             trial=len(self.recordings),
             states=path,
-            distances=distances,
+            distances=world.distances(path, aims),
             goal=goal,
             goals=None if task.goal.plain else aims,
             outcome=outcome,
