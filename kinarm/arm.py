@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 from kinarm._files import first_line
 from kinarm.arm_specification import AllowedContact, ArmSpecification
 from kinarm.bodies import HeldBody
-from kinarm.chain import Chain, length_of, link_lengths, within_limits
+from kinarm.chain import Chain, length_of, link_lengths
 from kinarm.errors import ArmError, finite_array
 from kinarm.meshes import coal_shape, hulls_of_mesh
 from kinarm.urdf import Description, read_urdf
@@ -99,7 +99,7 @@ class Arm:
         home = np.clip(np.zeros(chain.n_joints), chain.lower, chain.upper)
         if wanted.home is not None:
             home = finite_array("home", wanted.home, home.shape)
-            home = within_limits("home", home, chain, tuple(model.names)[1:])
+            home = chain.within_limits("home", home, tuple(model.names)[1:])
         loaded = cls(
             specification=specification,
             description=description,

@@ -58,16 +58,48 @@ class Chain(NamedTuple):
         return cls(
             prismatic=prismatic,
             translation=np.array([placement.translation for placement in placements]),
-            # Pinocchio's order is x, y, z, w.
-            rotation=np.array(
-                [np.roll(pin.Quaternion(each.rotation).coeffs(), 1) for each in placements]
-            ),
+            rotation=np.array([quaternion_of(each.rotation) for each in placements]),
             axis=np.where(prismatic[:, None], subspaces[:, :3], subspaces[:, 3:]),
             tool=np.array(frame.placement.translation),
             lower=np.array(model.lowerPositionLimit),
             upper=np.array(model.upperPositionLimit),
             velocity_limits=np.array(model.velocityLimit),
         )
+
+    def within_limits(
+        self, name: str, configurations: NDArray[np.float64], joint_names: tuple[str, ...]
+    ) -> NDArray[np.float64]:
+        """Clip configurations that rounding put beyond the limits, and refuse those farther out.
+
+        Raises InvalidInputError if one lies beyond a limit by more than `ROUNDING`.
+
+        Parameters
+        ----------
+        name : str
+            What they are, for messages.
+        configurations : ndarray, shape (n_joints,) or (n, n_joints)
+            Joint positions [rad or m].
+        joint_names : tuple of str
+            Names of the joints, for messages.
+        """
+        lower, upper = self.lower, self.upper
+        if not ((configurations < lower) | (configurations > upper)).any():
+            return configurations
+        clipped = np.clip(configurations, lower, upper)
+        beyond = np.abs(configurations - clipped) > ROUNDING
+        if beyond.any():
+            *row, joint = (int(index) for index in np.argwhere(beyond)[0])
+            value = configurations[(*row, joint)]
+            raise InvalidInputError(
+                f"{name}{row or ''} lies outside the limits: {joint_names[joint]} at {value:.6g}, "
+                f"{lower[joint]:.6g} to {upper[joint]:.6g} allowed"
+            )
+        return clipped
+
+
+def quaternion_of(rotation: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Quaternion w, x, y, z of a rotation matrix; Pinocchio's order is x, y, z, w."""
+    return np.roll(pin.Quaternion(rotation).coeffs(), 1)
 
 
 def _motion_subspace(joint: pin.JointModel) -> NDArray[np.float64]:
@@ -177,33 +209,3 @@ def point_speed(chain: Chain, axis: int, link: int, points: NDArray[np.float64])
     offset = length_of(np.cross(chain.axis[axis], following)) + slide
     between = lengths[axis + 2 : link].sum()
     return float(offset + between + np.linalg.norm(points, axis=1).max())
-
-
-def within_limits(
-    name: str, configurations: NDArray[np.float64], chain: Chain, joint_names: tuple[str, ...]
-) -> NDArray[np.float64]:
-    """Clip configurations that rounding put beyond the limits, and refuse those farther out.
-
-    Raises InvalidInputError if one lies beyond a limit by more than `ROUNDING`.
-
-    Parameters
-    ----------
-    name : str
-        What they are, for messages.
-    configurations : ndarray, shape (n_joints,) or (n, n_joints)
-        Joint positions [rad or m].
-    chain, joint_names
-        The arm.
-    """
-    if not ((configurations < chain.lower) | (configurations > chain.upper)).any():
-        return configurations
-    clipped = np.clip(configurations, chain.lower, chain.upper)
-    beyond = np.abs(configurations - clipped) > ROUNDING
-    if beyond.any():
-        *row, joint = (int(index) for index in np.argwhere(beyond)[0])
-        value = configurations[(*row, joint)]
-        raise InvalidInputError(
-            f"{name}{row or ''} lies outside the limits: {joint_names[joint]} at {value:.6g}, "
-            f"{chain.lower[joint]:.6g} to {chain.upper[joint]:.6g} allowed"
-        )
-    return clipped

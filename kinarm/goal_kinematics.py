@@ -4,11 +4,10 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-import pinocchio as pin
 from numpy.typing import ArrayLike, NDArray
 
 from kinarm.bodies import rotation_matrix, rotation_of_quaternion
-from kinarm.chain import within_limits
+from kinarm.chain import quaternion_of
 from kinarm.collision import ContactModel
 from kinarm.episodes import Pursuit, Rules
 from kinarm.errors import LARGEST, InvalidInputError, ProblemError, finite_array
@@ -52,7 +51,7 @@ class GoalKinematics(InverseKinematics):
         for number, configuration in enumerate(listed):
             name = f"{what}[{number}]"
             given = finite_array(name, configuration, (arm.n_joints,))
-            configurations[number] = within_limits(name, given, arm.chain, arm.joint_names)
+            configurations[number] = arm.chain.within_limits(name, given, arm.joint_names)
             pair = self.contact_model.contact_pair(configurations[number])
             if pair is not None:
                 raise ProblemError(f"{name} is in contact: {pair[0]} touches {pair[1]}")
@@ -62,7 +61,6 @@ class GoalKinematics(InverseKinematics):
         """Record of what is to be reached, and how; see ``kinarm.kernels.goals``."""
         task, dt = self.problem.task, self.problem.stepping.time_step
         goal, times = task.goal, np.arange(task.horizon + 1, dtype=np.float64) * dt
-        x, y, z, w = pin.Quaternion(self.tool[:3, :3]).coeffs()
         rules = GoalRules(
             kind=goal.number,
             hold=goal.hold,
@@ -70,7 +68,7 @@ class GoalKinematics(InverseKinematics):
             tolerance=goal.rotation_tolerance,
             stride=float("inf") if goal.speed is None else goal.speed * dt,
             axis=approach_axis(self.arm),
-            frame=np.array([w, x, y, z]),
+            frame=quaternion_of(self.tool[:3, :3]),
             moves=goal.motion.offsets(times) if goal.motion else np.zeros((0, 3)),
         )
         return recorded(rules)
@@ -111,7 +109,7 @@ class GoalKinematics(InverseKinematics):
         if goal.kind == "direction":
             listed = [unit((turn * axis).sum(axis=1)) for turn in turns]
         else:
-            listed = [unit(np.roll(pin.Quaternion(turn).coeffs(), 1)) for turn in turns]
+            listed = [unit(quaternion_of(turn)) for turn in turns]
         return goals.with_rests(np.array(listed) if listed else unknown)
 
     def configurations_at(
@@ -207,9 +205,9 @@ class GoalKinematics(InverseKinematics):
             raise InvalidInputError(
                 f"goals must have the shape (..., {width}), got {pairs[0].shape}"
             )
-        rows = [np.array(each.reshape(-1, width), order="C") for each in pairs]
-        distances, turns = np.empty((2, len(rows[0])))
-        errors_between(task.goal.number, *rows, distances, turns)
+        achieved, wanted = (np.array(each.reshape(-1, width), order="C") for each in pairs)
+        distances, turns = np.empty((2, len(achieved)))
+        errors_between(task.goal.number, achieved, wanted, distances, turns)
         near = (distances <= task.tolerance) & (turns <= task.goal.rotation_tolerance)
         return near.reshape(shape)[()]
 
@@ -230,7 +228,7 @@ class GoalKinematics(InverseKinematics):
                     f"directions and quaternions of goals must have length 1, but goal "
                     f"{off.argmax()} has {goal[off.argmax(), 3:].tolist()}"
                 )
-        return within_limits("starts", q, self.arm.chain, self.arm.joint_names), goal
+        return self.arm.chain.within_limits("starts", q, self.arm.joint_names), goal
 
     def pursuit(self, goals: Array, *, record: bool) -> Any:
         """Record of what episodes have besides, with only their first goals."""

@@ -10,7 +10,6 @@ from numpy.typing import ArrayLike, NDArray
 
 from kinarm._parallel import run_rows
 from kinarm.arm import Arm
-from kinarm.chain import within_limits
 from kinarm.errors import (
     NOT_NEGATIVE,
     InvalidInputError,
@@ -175,7 +174,7 @@ class InverseKinematics(ABC):
         arm = self.arm
         positions, wanted, axes = self._targets(targets, directions)
         start = finite_array("near", arm.home if near is None else near, (arm.n_joints,))
-        start = within_limits("near", start, arm.chain, arm.joint_names)
+        start = arm.chain.within_limits("near", start, arm.joint_names)
         for name, each in (("position", position_tolerance), ("rotation", rotation_tolerance)):
             check_range(f"{name}_tolerance", each, NOT_NEGATIVE)
         search = self._search(axes, start, joints, seeds)._replace(

@@ -17,7 +17,6 @@ from kinarm._files import reading
 from kinarm.arm import Arm
 from kinarm.arm_specification import ArmSpecification
 from kinarm.bodies import Body, HeldBody
-from kinarm.chain import within_limits
 from kinarm.errors import InvalidInputError, KinarmError, finite_array, needed
 from kinarm.problem import ReachProblem
 from kinarm.scene import GoalRegion, Mount, Scene
@@ -144,7 +143,7 @@ def _configuration(entry: Entry, given: Mapping[str, Any], arm: Arm) -> NDArray[
     if lacking := [name for name in arm.joint_names if name not in given]:
         raise entry.refusal(f"{', '.join(lacking)} of arm {arm.name!r} is missing")
     q = np.array([given[name] for name in arm.joint_names], dtype=np.float64)
-    return within_limits(f"{entry.file}: {entry.keys}", q, arm.chain, arm.joint_names)
+    return arm.chain.within_limits(f"{entry.file}: {entry.keys}", q, arm.joint_names)
 
 
 def _obstacles(scene: Entry) -> tuple[Body, ...]:

@@ -10,7 +10,6 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from kinarm._files import load_archive, reading, save_archive
-from kinarm.chain import within_limits
 from kinarm.episodes import Outcome, Rollouts
 from kinarm.errors import (
     InvalidInputError,
@@ -279,7 +278,7 @@ def record_path(
     points = finite_array("path", path, (None, world.arm.n_joints))
     if len(points) == 0:
         raise InvalidInputError("path holds no configuration")
-    points = within_limits("path", points, world.arm.chain, world.arm.joint_names)
+    points = world.arm.chain.within_limits("path", points, world.arm.joint_names)
     width = (world.goal_width,)
     aim = world.reached(points[-1:])[0] if goal is None else finite_array("goal", goal, width)
     world = world.in_scene(points[0], aim)

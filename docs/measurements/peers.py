@@ -22,13 +22,14 @@ from numpy.typing import NDArray
 
 from docs.measurements.self_contact import of_hulls
 from docs.measurements.turns import alternated
+from kinarm.chain import quaternion_of
 from kinarm.envs import ReachVectorEnv
 from kinarm.evaluation.bench import VECTOR_ENVS
 from kinarm.evaluation.report.templating import markdown_table
 from kinarm.evaluation.trials import TrialSet
 from kinarm.policies import Policy, load_policy, recipe, train_policy
 from kinarm.policies.learners import find_learner, state_policy
-from kinarm.policies.running.mujoco_arm import arm_spec, set_servos, turn
+from kinarm.policies.running.mujoco_arm import arm_spec, set_servos
 from kinarm.policies.sb3.environment import sb3_vec_env
 from kinarm.problem import PROBLEMS
 from kinarm.simulator import Simulator
@@ -186,7 +187,7 @@ def add_shape(spec: Any, body: Any, shape: pin.GeometryObject, name: str) -> Non
         spec.add_mesh(name=name, uservert=np.ravel(solid.points()))
         geom.type, geom.meshname, size = mjtGeom.mjGEOM_MESH, name, []
     geom.size[: len(size)] = size
-    geom.pos, geom.quat = placement.translation, turn(placement)
+    geom.pos, geom.quat = placement.translation, quaternion_of(placement.rotation)
 
 
 def joint_targets(

@@ -8,7 +8,6 @@ import numpy as np
 from gymnasium.spaces import Box, Space
 from numpy.typing import DTypeLike, NDArray
 
-from kinarm.chain import within_limits
 from kinarm.envs.rendering import RENDER_MODES, EnvPictures
 from kinarm.episodes import Episodes
 from kinarm.errors import InvalidInputError, UnknownNameError, one_or_many
@@ -242,6 +241,6 @@ def fixed_scenario(
             )
         if name == "start":
             given = array[0] if one else array
-            array = within_limits(name, given, arm.chain, arm.joint_names)
+            array = arm.chain.within_limits(name, given, arm.joint_names)
         fixed[name] = np.broadcast_to(array, (n, widths[name]))
     return fixed

@@ -10,7 +10,6 @@ from numpy.typing import ArrayLike
 
 from kinarm._files import write_text
 from kinarm.bodies import rotation_matrix
-from kinarm.chain import within_limits
 from kinarm.errors import POSITIVE, InvalidInputError, NoPathError, check_range, finite_array
 from kinarm.kernels.compiling import Array
 from kinarm.policies.planning.motions import Motions
@@ -195,7 +194,7 @@ def _reaching(
     """
     numbers = finite_array(what, given, (PARTS.get(kind, world.arm.n_joints),))
     if kind == "configuration":
-        found = within_limits(what, numbers, world.arm.chain, world.arm.joint_names)[None]
+        found = world.arm.chain.within_limits(what, numbers, world.arm.joint_names)[None]
     else:
         aim = numbers[:3]
         if kind == "pose":

@@ -7,7 +7,6 @@ there.
 
 import numpy as np
 
-from kinarm.chain import within_limits
 from kinarm.errors import InvalidInputError
 from kinarm.kernels.compiling import Array
 from kinarm.policies.running.backend import WiredArm
@@ -52,7 +51,7 @@ class ContractCheck:
     ) -> None:
         self.arm, self.rate, self._names = arm, rate, np.array(world.arm.joint_names)
         pose, n = world.arm.home if at is None else at, world.n_actions
-        self.pose = within_limits("the pose", pose, world.arm.chain, world.arm.joint_names)
+        self.pose = world.arm.chain.within_limits("the pose", pose, world.arm.joint_names)
         off = np.random.default_rng(0).uniform(-PLACED - MOVE, PLACED + MOVE, (NEARBY, n))
         around = np.tile(self.pose, (NEARBY, 1))
         around[1:, :n] += off[1:]

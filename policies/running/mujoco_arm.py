@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 
+from kinarm.chain import quaternion_of
 from kinarm.errors import needed
 from kinarm.kernels.compiling import Array
 from kinarm.policies.running.backend import SimulatedArm
@@ -44,7 +45,8 @@ def arm_spec(mujoco: ModuleType, world: World, time_step: float, armature: float
     for k in range(arm.n_joints):
         moves = k < arm.n_actuated
         placement = arm.model.jointPlacements[k + 1] if moves else data.liMi[k + 1]
-        body = body.add_body(name=f"link{k + 1}", pos=placement.translation, quat=turn(placement))
+        turn = quaternion_of(placement.rotation)
+        body = body.add_body(name=f"link{k + 1}", pos=placement.translation, quat=turn)
         body.explicitinertial, body.ipos = True, np.zeros(3)
         body.mass, body.inertia = 1.0, np.full(3, 0.01)
         if moves:
@@ -56,12 +58,6 @@ def arm_spec(mujoco: ModuleType, world: World, time_step: float, armature: float
             servo = spec.add_actuator(target=joint.name, trntype=mujoco.mjtTrn.mjTRN_JOINT)
             servo.biastype, servo.ctrlrange = mujoco.mjtBias.mjBIAS_AFFINE, limits
     return spec
-
-
-def turn(placement: pin.SE3) -> Array:
-    """Rotation of a placement as MuJoCo has it, a quaternion (w, x, y, z)."""
-    x, y, z, w = pin.Quaternion(placement.rotation).coeffs()
-    return np.array([w, x, y, z])
 
 
 def set_servos(model: Any, stiffness: Any, damping: Any) -> None:

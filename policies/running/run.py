@@ -6,7 +6,6 @@ from time import perf_counter
 import numpy as np
 from numpy.typing import ArrayLike
 
-from kinarm.chain import within_limits
 from kinarm.episodes import COLLISION, RUNNING, SUCCESS, Episodes, Outcome
 from kinarm.errors import InvalidInputError, ProblemError, RunStoppedError
 from kinarm.kernels.compiling import Array
@@ -129,7 +128,7 @@ class Run:
         within = np.clip(reading, arm.lower, arm.upper)
         near = np.abs(reading - within) <= arm.velocity_limits * time_step
         start = np.where(near, within, reading)
-        return within_limits("what the arm reads", start, arm.chain, arm.joint_names)
+        return arm.chain.within_limits("what the arm reads", start, arm.joint_names)
 
     def _rehearse(self, goal: Array) -> None:
         """Refuse a start in contact, and a rate that this machine cannot keep."""

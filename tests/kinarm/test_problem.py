@@ -10,7 +10,7 @@ import pytest
 from random_scenes import CLUTTER, random_scene, swinging
 
 from kinarm.arm import ArmSpecification
-from kinarm.errors import KinarmError, ProblemError, UnknownNameError
+from kinarm.errors import KinarmError, UnknownNameError
 from kinarm.problem import PROBLEMS, ReachProblem
 from kinarm.scene import PAPER_BENCHES, GoalRegion, Mount, Scene
 from kinarm.task import ReachTask, RewardWeights, Stepping
