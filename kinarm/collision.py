@@ -129,7 +129,9 @@ class ContactModel:
         """
         geometry = arm.geometry.copy()
         n_shapes = geometry.ngeoms
-        _add_scene(geometry, scene)
+        for body in scene.bodies:
+            place = pin.SE3(body.rotation, np.array(body.position))
+            geometry.addGeometryObject(pin.GeometryObject(body.name, 0, place, coal_shape(body)))
         surroundings = [shape.name for shape in geometry.geometryObjects][n_shapes:]
         candidates = candidate_pairs(arm, geometry, n_shapes)
         for pair in candidates:
@@ -271,10 +273,3 @@ class ContactModel:
 
     def __reduce__(self) -> tuple[type, tuple[object, ...]]:
         return type(self), tuple(getattr(self, item.name) for item in fields(self))
-
-
-def _add_scene(geometry: pin.GeometryModel, scene: Scene) -> None:
-    """Add the bodies of a scene to a geometry model."""
-    for body in scene.bodies:
-        placement = pin.SE3(body.rotation, np.array(body.position))
-        geometry.addGeometryObject(pin.GeometryObject(body.name, 0, placement, coal_shape(body)))

@@ -14,6 +14,7 @@ from kinarm.kernels.rollout import advance, allow_one_step, begin, refuse
 from kinarm.kernels.session import Session
 from kinarm.networks import PolicyFunction, takes_rows
 from kinarm.scenarios import draw_followers
+from kinarm.step_contact import steps_in_contact
 from kinarm.world import World
 
 
@@ -130,7 +131,9 @@ class EpisodeRunner:
     def _decide(self, session: Session, paused: NDArray[np.int64]) -> NDArray[np.int64]:
         """Let Coal refuse steps in doubt; return which episodes go on."""
         episodes = session.episodes
-        refused, asked = self.world.decided(episodes, paused)
+        ways = episodes.q[paused], episodes.target[paused], episodes.scenes_at(paused)
+        steps = self.world.steps_of(*ways, episodes.steps[paused])
+        refused, asked = steps_in_contact(steps, episodes.doubt[paused], self.world.rules)
         self.checked_by_coal += asked
         episodes.status[paused], episodes.cleared[paused] = RUNNING, ~refused
         if refused.any():

@@ -231,11 +231,6 @@ class Episodes(NamedTuple):
         """Scenes of some episodes when they began; empty if all have the same."""
         return self.scenes[rows] if len(self.scenes) else self.scenes
 
-    def resume(self, rows: NDArray[np.int64], horizon: int) -> None:
-        """Let episodes go on after success or contact, up to the horizon."""
-        over = self.steps[rows] >= horizon
-        self.status[rows] = np.where(over, TRUNCATED, RUNNING)
-
 
 @dataclass(frozen=True, eq=False)
 class Rollouts:

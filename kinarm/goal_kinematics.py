@@ -87,9 +87,7 @@ class GoalKinematics(InverseKinematics):
         regions = [scene.goal_region(name) for name in self.problem.task.goal_regions]
         lower = np.min([region.lower for region in regions], axis=0)
         upper = np.max([region.upper for region in regions], axis=0)
-        if len(moves):
-            return lower + moves.min(axis=0), upper + moves.max(axis=0)
-        return lower, upper
+        return lower + moves.min(axis=0, initial=0.0), upper + moves.max(axis=0, initial=0.0)
 
     @cached_property
     def goals(self) -> Goals:

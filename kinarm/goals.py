@@ -178,12 +178,6 @@ class Goals(NamedTuple):
         )
 
 
-def perpendicular(direction: Array) -> Array:
-    """A direction at right angles to another."""
-    least = np.eye(3)[np.abs(direction).argmin()]
-    return unit(np.cross(direction, least))
-
-
 def unit(vector: Array) -> Array:
     """A vector scaled to length one."""
     scaled: Array = vector / math.sqrt((vector * vector).sum())
@@ -193,6 +187,7 @@ def unit(vector: Array) -> Array:
 def quaternion_between(first: Array, second: Array) -> Array:
     """Smallest rotation from one direction to another, as a quaternion, shape (4,)."""
     cosine = float((first * second).sum())
-    if cosine < -0.999999:
-        return np.concatenate([[0.0], perpendicular(first)])
+    if cosine < -0.999999:  # half a turn about any axis at right angles
+        least = np.eye(3)[np.abs(first).argmin()]
+        return np.concatenate([[0.0], unit(np.cross(first, least))])
     return unit(np.concatenate([[1.0 + cosine], np.cross(first, second)]))

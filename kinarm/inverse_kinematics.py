@@ -285,7 +285,10 @@ class InverseKinematics(ABC):
             raise InvalidInputError(
                 f"directions must be one or as many as targets: {len(along)} for {len(positions)}"
             )
-        along = np.broadcast_to(_units("directions", along), positions.shape)
+        lengths = np.sqrt(np.square(along).sum(axis=1, keepdims=True))
+        if not (lengths > 0).all():
+            raise InvalidInputError("directions must not be zero")
+        along = np.broadcast_to(along / lengths, positions.shape)
         # Copies are writable like the others: kernels are not compiled once more for them.
         axes = np.array(approach_axis(self.arm)[None])
         return positions, np.array(along[:, None], order="C"), axes
@@ -306,15 +309,6 @@ def _check_poses(poses: Array) -> None:
         else:
             reason = f"its last row is {poses[target, 3].tolist()}, not [0, 0, 0, 1]"
         raise InvalidInputError(f"target {target} is no pose: {reason}")
-
-
-def _units(name: str, vectors: Array) -> Array:
-    """Scale vectors, shape (n, 3), to length one."""
-    lengths = np.sqrt(np.square(vectors).sum(axis=1, keepdims=True))
-    if not (lengths > 0).all():
-        raise InvalidInputError(f"{name} must not be zero")
-    units: Array = vectors / lengths
-    return units
 
 
 def approach_axis(arm: Arm) -> Array:

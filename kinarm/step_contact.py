@@ -11,7 +11,7 @@ import pinocchio as pin
 from numpy.typing import ArrayLike, NDArray
 
 from kinarm.collision import Contact, ContactModel, Step
-from kinarm.episodes import Episodes, Rules
+from kinarm.episodes import Rules
 from kinarm.errors import finite_array, whole_number
 from kinarm.kernels.compiling import Array
 from kinarm.problem import ReachProblem
@@ -101,12 +101,6 @@ class StepContact:
         rows = scenes.copy()
         rows[:, moving, 13:] += self.problem.body_offsets(taken)
         return rows
-
-    def decided(self, episodes: Episodes, rows: NDArray[np.int64]) -> tuple[NDArray[np.bool_], int]:
-        """Let Coal decide about the steps of some episodes; see ``steps_in_contact``."""
-        bodies = episodes.scenes_at(rows), episodes.steps[rows]
-        steps = self.steps_of(episodes.q[rows], episodes.target[rows], *bodies)
-        return steps_in_contact(steps, episodes.doubt[rows], self.rules)
 
     def contact_pair(
         self, configuration: ArrayLike, target: ArrayLike | None = None, *, step: int = 0

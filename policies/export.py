@@ -3,7 +3,6 @@
 import hashlib
 import io
 import json
-from collections.abc import Mapping
 from operator import methodcaller
 from pathlib import Path
 from typing import Any
@@ -13,14 +12,14 @@ from numpy.typing import ArrayLike
 
 import kinarm
 from kinarm._fields import to_plain
-from kinarm._files import absolute, check_folder, save_archive, shipped_files, write_atomically
+from kinarm._files import absolute, check_folder, shipped_files, write_atomically
 from kinarm.arm import Arm
 from kinarm.contact_statistics import random_configurations
 from kinarm.errors import InvalidInputError, OutputError, PolicyFileError, finite_array
 from kinarm.kernels.compiling import Array
 from kinarm.policies import arm_policy, self_test
 from kinarm.policies.conversion.to_torch import command_module, onnx_model
-from kinarm.policies.policy import FORMAT_VERSION, Policy, policy_content
+from kinarm.policies.policy import Policy
 from kinarm.world import World
 
 REACHED = ("rotation_tolerance", "hold", "speed")
@@ -90,10 +89,9 @@ def export_policy(
     world = World(policy.problem, threads=1)
     policy.check_arm(world.arm)
     contract, packed = contract_of(policy, world, sign, offset), io.BytesIO()
-    content = policy_content(policy)
-    save_archive(packed, "policy", FORMAT_VERSION, content.arrays, content.header, compress=True)
+    policy.save(packed)
     contract["policy"]["sha256"] = hashlib.sha256(packed.getvalue()).hexdigest()
-    files = _onnx_files(policy, content.arrays, contract) if onnx else {}
+    files = _onnx_files(policy, contract) if onnx else {}
     contract["onnx"] = [*files]
     contract["digest"] = self_test.digest_of(contract)
     files |= {
@@ -207,16 +205,15 @@ def _vectors(
     return [{name: rows[k].tolist() for name, rows in columns.items()} for k in range(VECTORS)]
 
 
-def _onnx_files(
-    policy: Policy, arrays: Mapping[str, Any], contract: dict[str, Any]
-) -> dict[str, bytes]:
+def _onnx_files(policy: Policy, contract: dict[str, Any]) -> dict[str, bytes]:
     """The bare network, and unless the observation needs memory, all from joints to commands."""
     shown, network, n = contract["observation"], policy.to_torch(), len(contract["joints"])
     files = {"network.onnx": onnx_model(network, {"observation": policy.n_observations}, "action")}
     if shown["memory"] or contract["resolution"]:
         return files
     inputs = {"joint_positions": n, "goal": contract["goal"]["length"], "commanded": n}
-    return files | {"policy.onnx": onnx_model(command_module(arrays, contract), inputs, "command")}
+    module = command_module(policy.arrays, contract)
+    return files | {"policy.onnx": onnx_model(module, inputs, "command")}
 
 
 def _readme(contract: dict[str, Any]) -> str:

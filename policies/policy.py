@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import chain, count
 from pathlib import Path
-from typing import Any
+from typing import IO, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -288,7 +288,7 @@ class Policy:
                 f"the policy was trained for {other} {trained.name!r}, not for {arm.name!r}"
             )
 
-    def save(self, path: str | Path) -> None:
+    def save(self, path: str | Path | IO[bytes]) -> None:
         """Write an ``.npz`` file without pickle, all of it or nothing."""
         content = policy_content(self)
         # Weights of networks are of single precision: compressed, they take half.

@@ -65,22 +65,19 @@ class Provenance:
         algorithm, config, environment_steps
             Name of the learner, its settings, and steps taken.
         """
+        settings = to_plain(config)
+        del settings["problem"]
         return cls(
             algorithm=algorithm,
             recipe=config.recipe,
             problem=config.problem.pinned,
             seed=config.seed,
             environment_steps=environment_steps,
-            config=plain_settings(config),
+            config=settings,
             versions=package_versions(),
             commit=source_commit(),
             semantics=SEMANTICS,
         )
-
-
-def plain_settings(config: TrainingConfig) -> dict[str, Any]:
-    """Settings of a learner without the problem, for JSON."""
-    return {name: value for name, value in to_plain(config).items() if name != "problem"}
 
 
 def normalization_remark(config: Mapping[str, Any]) -> str:

@@ -11,7 +11,7 @@ from kinarm._files import shipped_files
 from kinarm.errors import InvalidInputError, UnknownNameError
 from kinarm.policies.config import ConfigT
 from kinarm.policies.learners import Learner, find_learner
-from kinarm.problem import PROBLEMS, ReachProblem
+from kinarm.problem import PROBLEMS
 
 PER_TRAINING = ("problem", "seed")
 """Settings that vary between trainings with a recipe."""
@@ -135,7 +135,10 @@ def _adapted(config: ConfigT, special: Mapping[tuple[str, str], Mapping[str, Any
 
     problem, changes = config.problem, dict[str, Any]()
     changes["symmetric"] = symmetric = not missing_mirror(problem)
-    held = (different_regions(problem, symmetric) > 1, _asks_more(problem))
+    goal, scene = problem.task.goal, problem.scene
+    unseen = problem.plant.range_of("goal_noise")[1] > 0
+    more = unseen or goal.number or goal.changes or scene.moving or scene.random_bodies
+    held = (different_regions(problem, symmetric) > 1, more)
     for condition in compress(CONDITIONS, held):
         config = replace(config, **special.get((config.recipe, condition), {}))
     scale = problem.task.tolerance / PROBLEMS["right"].task.tolerance
@@ -145,10 +148,3 @@ def _adapted(config: ConfigT, special: Mapping[tuple[str, str], Mapping[str, Any
     relative = round(problem.load_arm().reach / RECIPE_REACH, 2)
     changes["reward"] = replace(weights, progress=weights.progress / relative)
     return replace(config, **changes)
-
-
-def _asks_more(problem: ReachProblem) -> bool:
-    """Whether more is asked than `CONDITIONS` say."""
-    goal, scene = problem.task.goal, problem.scene
-    unseen = problem.plant.range_of("goal_noise")[1] > 0
-    return unseen or goal.number > 0 or goal.changes or bool(scene.moving or scene.random_bodies)

@@ -49,8 +49,6 @@ BACKGROUND = [0.93, 0.945, 0.96]
 CLUTTER = ("/Axes", "/Grid", "/Lights/PointLightPositiveX", "/Lights/PointLightNegativeX")
 """Meshcat's default objects that replays do not show."""
 DIMMED = {"/Lights/AmbientLight/<object>": 0.42, "/Lights/FillLight/<object>": 0.2}
-FIELD_OF_VIEW, CAMERA_PLACE = 32, (-2.4, 1.6, 1.9)
-"""Of the live page [degrees, m]; in three.js, y points up."""
 
 
 class DrawnScene:
@@ -109,19 +107,20 @@ def _show(window: Visualizer, shown: geometry.Object) -> None:
     window.set_object(shown)
 
 
-def draw_stage(window: Visualizer, arm: Arm, scene: Scene) -> None:
-    """Draw surroundings, the ball at a contact, and an arm.
+def draw_stage(window: Visualizer, arm: Arm, problem: ReachProblem) -> None:
+    """Draw surroundings, the ball at a contact, an arm and a goal.
 
     Parameters
     ----------
     window : meshcat.Visualizer
         Where to draw.
-    arm, scene : Arm, Scene
-        The arm, and its surroundings.
+    arm, problem : Arm, ReachProblem
+        The arm, and the problem with its surroundings and goals.
     """
-    draw_surroundings(window, scene)
-    put(window["flash"], FLASH, capsule(0.0, stage_scale(arm, scene) * FLASH_RADIUS))
+    draw_surroundings(window, problem.scene)
+    put(window["flash"], FLASH, capsule(0.0, stage_scale(arm, problem.scene) * FLASH_RADIUS))
     draw_arm(window["arm"], arm)
+    draw_goal(window["goal"], problem)
 
 
 def draw_surroundings(window: Visualizer, scene: Scene) -> None:
@@ -179,13 +178,6 @@ def _draw_obstacles(window: Visualizer, scene: Scene) -> None:
         if slab:
             put(window[f"{number}/top"], GOAL_SLAB, *slab)
         put(window[f"{number}/body"], OBSTACLE, body)
-
-
-def aim_camera(window: Visualizer, scale: float = 1.0) -> None:
-    """Look from behind the arm's right; see `kinarm.viewer.camera.stage_scale`."""
-    camera = window["/Cameras/default/rotated/<object>"]
-    camera.set_property("fov", FIELD_OF_VIEW)
-    camera.set_property("position", [scale * value for value in CAMERA_PLACE])
 
 
 def draw_goal(window: Visualizer, problem: ReachProblem) -> None:

@@ -13,7 +13,6 @@ from kinarm.body_motion import BodyMotion
 from kinarm.problem import ReachProblem
 from kinarm.viewer.camera import stage_scale
 from kinarm.viewer.drawing import (
-    aim_camera,
     draw_arm,
     draw_goal,
     draw_random_bodies,
@@ -21,6 +20,9 @@ from kinarm.viewer.drawing import (
     draw_trace,
 )
 from kinarm.viewer.parts import goal_pose
+
+FIELD_OF_VIEW, CAMERA_PLACE = 32, (-2.4, 1.6, 1.9)
+"""From behind the arm's right [degrees, m]; in three.js, y points up."""
 
 
 class LiveStage:
@@ -34,7 +36,9 @@ class LiveStage:
         window.window.ids = count()  # of what is drawn
         self.address: str = window.url()
         draw_surroundings(window, problem.scene)
-        aim_camera(window, self._scale)
+        camera = window["/Cameras/default/rotated/<object>"]
+        camera.set_property("fov", FIELD_OF_VIEW)
+        camera.set_property("position", [self._scale * value for value in CAMERA_PLACE])
         draw_goal(window["goal"], problem)
         self._frames = draw_arm(window["arm"], arm)[1:]
 

@@ -21,7 +21,6 @@ from kinarm.scene import Scene
 from kinarm.viewer.camera import stage_scale
 from kinarm.viewer.drawing import (
     DrawnScene,
-    draw_goal,
     draw_random_bodies,
     draw_stage,
     draw_trace,
@@ -117,8 +116,7 @@ def replay_page(
     arm, scene, drawn = problem.load_arm(), problem.scene, DrawnScene()
     trials = list(zip(chosen, ghosts, strict=True)) if ghosts else [(run,) for run in chosen]
     policies = dict.fromkeys(run.policy for runs in trials for run in runs)
-    draw_stage(drawn.window, arm, scene)
-    draw_goal(drawn.window["goal"], problem)
+    draw_stage(drawn.window, arm, problem)
     shown = []
     for number, runs in enumerate(trials):
         episode = scene, arm, runs[0].states[0], runs[0].goal

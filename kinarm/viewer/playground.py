@@ -12,7 +12,7 @@ from kinarm.kernels.compiling import Array
 from kinarm.kernels.plant import RATE, SERVO, TRAPEZE
 from kinarm.plant import Plant
 from kinarm.shield import shield_table
-from kinarm.viewer.drawing import DrawnScene, draw_goal, draw_stage
+from kinarm.viewer.drawing import DrawnScene, draw_stage
 from kinarm.viewer.html_page import HtmlPage, page_html
 from kinarm.viewer.pages import arm_data, contact_data
 from kinarm.viewer.parts import PAGE_COLOURS
@@ -54,8 +54,7 @@ def play_page(
     """
     problem, arm, scene, drawn = world.problem, world.arm, world.problem.scene, DrawnScene()
     _check_playable(world)
-    draw_stage(drawn.window, arm, scene)
-    draw_goal(drawn.window["goal"], problem)
+    draw_stage(drawn.window, arm, problem)
     data = {
         **arm_data(arm, scene),
         **contact_data(world.contact_model),

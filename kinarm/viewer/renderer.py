@@ -135,7 +135,9 @@ class Renderer:
             self._surfaces += [(frame, finish, _single([mesh])) for finish, mesh in parts]
         self._eye = single(self.camera.position)
         self._has_floor = scene.ground and self._eye[2] > 0
-        self._floor = self._faded(_disc(), FLOOR)._replace(hides=True)
+        rings = np.append(0, np.geomspace(0.5, FLOOR_RADIUS, 24))
+        disc = lathe([(0.0, radius) for radius in rings])
+        self._floor = self._faded(disc.vertices[disc.faces.ravel()], FLOOR)._replace(hides=True)
         self._lines = self._faded(self._grid(), GRID)
 
     def __repr__(self) -> str:
@@ -311,13 +313,6 @@ def _ball(place: ArrayLike, radius: float, colour: tuple[float, ...]) -> Layer:
     mesh = capsule(0.0, radius).moved(place)
     places = mesh.vertices[mesh.faces.ravel()]
     return Layer(places, np.tile(colour, (len(places), 1)), hides=False)
-
-
-def _disc() -> Array:
-    """The floor about the origin: corners of triangles, shape (n, 3) [m]."""
-    radii = np.append(0, np.geomspace(0.5, FLOOR_RADIUS, 24))
-    mesh = lathe([(0.0, radius) for radius in radii])
-    return mesh.vertices[mesh.faces.ravel()]
 
 
 def _on_floor(places: Array) -> Array:

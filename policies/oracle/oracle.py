@@ -148,23 +148,18 @@ class Oracle:
         StartInContactError
             If a start touches something.
         """
-        q, g = self._scenarios(starts, goals)
-        parts = []
+        q, one_start = one_or_many("starts", starts, (self.simulator.arm.n_joints,))
+        g, one_goal = one_or_many("goals", goals, (self.simulator.world.goal_width,))
+        q = np.tile(q, (len(g) if one_start else 1, 1))
+        g = np.tile(g, (len(q) if one_goal else 1, 1))
+        episodes, parts = self.simulator.reset(q, g), []
+        q, g = episodes.q, episodes.first_goals
         for first in range(0, max(len(q), 1), LOT):
             lot = slice(first, first + LOT)
             parts += self._solve_lots(q[lot], g[lot])
             if on_progress is not None:
                 on_progress(min(first + LOT, len(q)), len(q))
         return OracleSolutions.concatenated(parts)
-
-    def _scenarios(self, starts: ArrayLike, goals: ArrayLike) -> tuple[Array, Array]:
-        """Starts and goals, one row a trial, if they are possible."""
-        q, one_start = one_or_many("starts", starts, (self.simulator.arm.n_joints,))
-        g, one_goal = one_or_many("goals", goals, (self.simulator.world.goal_width,))
-        q = np.tile(q, (len(g) if one_start else 1, 1))
-        g = np.tile(g, (len(q) if one_goal else 1, 1))
-        episodes = self.simulator.reset(q, g)
-        return episodes.q, episodes.first_goals
 
     def _solve_lots(self, starts: Array, goals: Array) -> list[OracleSolutions]:
         """Solve trials together, or each in its own scene."""
