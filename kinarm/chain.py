@@ -180,8 +180,7 @@ def lengths_to_tool(chain: Chain) -> NDArray[np.float64]:
             aside = np.sqrt(np.square(np.cross(chain.axis[k + 1], ends)).sum(axis=1))
             both = length_of(np.array([along[1] - along[0], aside.sum()]))
             found[k] = min(found[k], both + found[k + 2])
-    lengths: NDArray[np.float64] = found[:n]
-    return lengths
+    return found[:n]
 
 
 def point_speed(chain: Chain, axis: int, link: int, points: NDArray[np.float64]) -> float:

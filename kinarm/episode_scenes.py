@@ -19,8 +19,7 @@ from kinarm.scene_draws import SceneDraws
 
 def bits_of(starts: Array, goals: Array) -> NDArray[np.uint64]:
     """Bits of goals and starts, shape (n, 3 + n_joints), which decide what an episode draws."""
-    bits: NDArray[np.uint64] = (np.concatenate([goals, starts], axis=1) + 0.0).view(np.uint64)
-    return bits
+    return (np.concatenate([goals, starts], axis=1) + 0.0).view(np.uint64)
 
 
 def drawn_rows(

@@ -180,8 +180,7 @@ class Goals(NamedTuple):
 
 def unit(vector: Array) -> Array:
     """A vector scaled to length one."""
-    scaled: Array = vector / math.sqrt((vector * vector).sum())
-    return scaled
+    return vector / math.sqrt((vector * vector).sum())
 
 
 def quaternion_between(first: Array, second: Array) -> Array:

@@ -163,5 +163,4 @@ class EnvPictures:
 
     def _tools(self, episodes: Episodes) -> NDArray[np.float64]:
         """Tool points, shape (num_envs, 3) [m]."""
-        tools: NDArray[np.float64] = self._simulator.world.poses(episodes.q)[:, :3, 3]
-        return tools
+        return self._simulator.world.poses(episodes.q)[:, :3, 3]

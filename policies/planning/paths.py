@@ -152,5 +152,4 @@ def on_path(path: Array, arrival: Array, times: Array) -> Array:
     duration = arrival[after] - arrival[before]
     shares = np.zeros(len(times))
     np.divide(times - arrival[before], duration, out=shares, where=duration > 0.0)
-    configurations: Array = path[before] + shares[:, None] * (path[after] - path[before])
-    return configurations
+    return path[before] + shares[:, None] * (path[after] - path[before])
