@@ -16,11 +16,7 @@ from kinarm.contact_shapes import PLANE, ContactShapes, unit_boxes
 from kinarm.episode_plants import EpisodePlants
 from kinarm.episode_scenes import drawn_rows
 from kinarm.episodes import Control, Episodes, Rules
-from kinarm.errors import (
-    finite_array,
-    one_or_many,
-    whole_number,
-)
+from kinarm.errors import finite_array, one_or_many, whole_number
 from kinarm.goal_kinematics import GoalKinematics
 from kinarm.kernels.compiling import Array
 from kinarm.kernels.network import ACT_BY_NETWORKS
@@ -70,9 +66,8 @@ class World(GoalKinematics, StepContact):
 
     def __init__(self, problem: ProblemLike, *, threads: int | None = None) -> None:
         self.problem = ReachProblem.load(problem)
-        self.threads = (
-            available_threads() if threads is None else whole_number("threads", threads, 1)
-        )
+        wanted = available_threads() if threads is None else threads
+        self.threads = whole_number("threads", wanted, 1)
         self.arm = self.problem.load_arm()
         self.contact_model = ContactModel.build(self.arm, self.problem.scene)
         self.starts = self.checked("task.starts", self.problem.task.starts)

@@ -5,8 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-CONSTANT_BELOW = 1e-6
-"""Inputs with a smaller standard deviation are constant and get weight zero."""
+from kinarm.policies.arm_policy import CONSTANT_BELOW
 
 
 def input_scale(std: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -19,17 +19,12 @@ from kinarm.problem import ReachProblem
 from kinarm.recording import Recording
 from kinarm.scene import Scene
 from kinarm.viewer.camera import stage_scale
-from kinarm.viewer.drawing import (
-    DrawnScene,
-    draw_random_bodies,
-    draw_stage,
-    draw_trace,
-)
+from kinarm.viewer.drawing import DrawnScene, draw_random_bodies, draw_stage, draw_trace
 from kinarm.viewer.html_page import HtmlPage, page_html
 from kinarm.viewer.parts import PAGE_COLOURS, TRACE_SIDES, goal_pose
 from kinarm.viewer.visual_shapes import arm_parts, link_joints
 
-RUN_FIELDS = ("policy", "outcome", "contact", "replaced")
+RUN_FIELDS = ("policy", "outcome", "contact", "replaced", "refused", "states", "distances")
 """What scripts know of a recording as it is."""
 
 
@@ -181,10 +176,7 @@ def _trial_data(runs: Sequence[Recording], moving: Mapping[str, BodyMotion]) -> 
         "runs": [
             {
                 **{name: getattr(run, name) for name in RUN_FIELDS},
-                "contactPoint": None if run.contact_point is None else run.contact_point.tolist(),
-                "refused": None if run.refused is None else run.refused.tolist(),
-                "states": run.states.tolist(),
-                "distances": run.distances.tolist(),
+                "contactPoint": run.contact_point,
             }
             for run in runs
         ],

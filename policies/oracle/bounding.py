@@ -11,7 +11,7 @@ from kinarm.kernels.compiling import Array
 from kinarm.kernels.goals import CONFIGURATION, DIRECTION, POSE, errors_between
 from kinarm.kernels.records import recorded
 from kinarm.policies.oracle.goals import Aims, Stage
-from kinarm.policies.oracle.kernels.approach import ROUNDING, WAITING, Boxes, layout, search
+from kinarm.policies.oracle.kernels.approach import ROUNDING, WAITING, layout, search
 from kinarm.simulator import Simulator
 
 BUDGET = 100_000
@@ -64,13 +64,15 @@ class Prover:
         simulator, n = self._simulator, len(rows)
         lower_bounds, tight = np.empty(n, dtype=np.int64), np.empty(n, dtype=bool)
         n_times = goals.shape[1] if goals.ndim == 3 else 1
-        placed = goals[rows].reshape(n * n_times, goals.shape[-1])
-        aims = Aims.of(simulator, np.repeat(starts[rows], n_times, axis=0), placed, ROUNDING)
+        asked = goals[rows].reshape(n * n_times, goals.shape[-1])
+        aims = Aims.of(simulator, np.repeat(starts[rows], n_times, axis=0), asked, ROUNDING)
 
         def bound_some(first: int, last: int) -> None:
             limits, tolerance = simulator.step_limit.copy(), simulator.task.tolerance
             best, (lower, upper) = np.empty(starts.shape[1]), np.empty((2, len(limits)))
-            space = self._space(len(aims.turn.axes))
+            placed, axes = len(simulator.world.contact_model.shapes.placed), len(aims.turn.axes)
+            boxes = layout(len(limits), starts.shape[1], placed, axes).record()
+            space = np.empty((WAITING, 2 * len(limits))), boxes
             for i in range(first, last):
                 start, few, many = starts[rows[i]].copy(), int(fewest[i]), int(most[i])
                 all_at_once = not contact and n_times == 1
@@ -122,9 +124,3 @@ class Prover:
         steps = np.clip(steps - SMALLEST, 1.0, simulator.task.horizon + 1.0)
         fewest: NDArray[np.int64] = np.ceil(steps).astype(np.int64)
         return fewest
-
-    def _space(self, n_axes: int) -> tuple[Array, Boxes]:
-        """Space for boxes that wait and boxes that are examined, with axes of the tool."""
-        n, n_joints = self._simulator.n_actions, self._simulator.arm.n_joints
-        n_placed = len(self._simulator.world.contact_model.shapes.placed)
-        return np.empty((WAITING, 2 * n)), layout(n, n_joints, n_placed, n_axes).record()

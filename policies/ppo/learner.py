@@ -46,9 +46,8 @@ class PPOTraining:
 
     def __init__(self, config: PPOConfig, threads: int | None = None) -> None:
         self.config, self.arms = config, TrainingArms(config)
-        if threads is None:
-            threads = available_threads()
-        self.threads = whole_number("threads", threads, 1)
+        wanted = available_threads() if threads is None else threads
+        self.threads = whole_number("threads", wanted, 1)
         self._widths = layer_widths(config.problem, config.net_arch)
         self.networks = ActorCritic(self._widths)
 
