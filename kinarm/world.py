@@ -18,7 +18,7 @@ from kinarm.episode_scenes import drawn_rows
 from kinarm.episodes import Control, Episodes, Rules
 from kinarm.errors import finite_array, one_or_many, whole_number
 from kinarm.goal_kinematics import GoalKinematics
-from kinarm.kernels.compiling import Array
+from kinarm.kernels.compiling import Array, Stage
 from kinarm.kernels.network import ACT_BY_NETWORKS
 from kinarm.kernels.records import recorded
 from kinarm.kernels.rollout import begin
@@ -99,7 +99,7 @@ class World(GoalKinematics, StepContact):
 
     def __getstate__(self) -> dict[str, Any]:
         # A copy may get other rules or bodies, and needs its own work space.
-        own = ("records", "layout")
+        own = ("records", "layout", "stages")
         kept = {name: value for name, value in self.__dict__.items() if name not in own}
         return kept | {"_idle": []}
 
@@ -113,6 +113,11 @@ class World(GoalKinematics, StepContact):
         """Chain, shapes and rules for the kernels, by their addresses."""
         shapes = self.contact_model.shapes
         return recorded(self.arm.chain), recorded(shapes), recorded(self.rules)
+
+    @cached_property
+    def stages(self) -> tuple[Stage, Stage, Stage]:
+        """What writes observations, runs networks and replaces steps; see `Session`."""
+        return observer(tuple(self.layout.places)), ACT_BY_NETWORKS, REPLACE_STEP
 
     @property
     def n_observations(self) -> int:
@@ -303,8 +308,7 @@ class World(GoalKinematics, StepContact):
 
     def session(self, control: Control, episodes: Episodes) -> Session:
         """Bind episodes and their source of actions for the kernels."""
-        stages = (observer(tuple(self.layout.places)), ACT_BY_NETWORKS, REPLACE_STEP)
-        return Session(*self.records, recorded(control), recorded(episodes), stages)
+        return Session(*self.records, recorded(control), recorded(episodes), self.stages)
 
     def _screen_some(self, first: int, last: int, *arrays: Any) -> int:
         """Screen some rows, with work space for this thread alone."""

@@ -83,14 +83,17 @@ class Stage:
     def __init__(self, function: Callable[..., int], *more: Any, key: str = "") -> None:
         lean = {"_nrt": False, "pipeline_class": LaneCompiler}
         self._compiled: Any = _called_by_python(function, key, **lean)
-        self._more = more
+        self._more, self._addresses = more, dict[Any, int]()
 
     def address(self, session: Any) -> int:
         """Address of the machine code for a type of sessions."""
-        arguments = (session, *self._more)
-        self._compiled.compile(arguments)
-        code = self._compiled.overloads[arguments]
-        return int(code.library.get_pointer_to_function(code.fndesc.llvm_func_name))
+        if session not in self._addresses:
+            arguments = (session, *self._more)
+            self._compiled.compile(arguments)
+            code = self._compiled.overloads[arguments]
+            name = code.fndesc.llvm_func_name
+            self._addresses[session] = code.library.get_pointer_to_function(name)
+        return self._addresses[session]
 
 
 @instruction
