@@ -52,7 +52,7 @@ def lean_kernel(function: Function) -> Function:
     return _called_by_python(function, _nrt=False, pipeline_class=LaneCompiler)
 
 
-def _called_by_python(function: Function, key: str = "", **more: Any) -> Function:
+def _called_by_python(function: Function, **more: Any) -> Function:
     options: dict[str, Any] = {
         "nogil": True,
         "error_model": "numpy",
@@ -61,7 +61,7 @@ def _called_by_python(function: Function, key: str = "", **more: Any) -> Functio
     } | more
     compiled: Any = njit(**options)(function)
     with suppress(RuntimeError):  # of Numba, if there is no folder that it can write to
-        compiled._cache = KernelCache(function, key)
+        compiled._cache = KernelCache(function)
     return cast("Function", compiled)
 
 
@@ -81,8 +81,10 @@ class Stage:
     """
 
     def __init__(self, function: Callable[..., int], *more: Any, key: str = "") -> None:
-        lean = {"_nrt": False, "pipeline_class": LaneCompiler}
-        self._compiled: Any = _called_by_python(function, key, **lean)
+        if key:
+            # Machine code is found by this name, in files and in memory.
+            function.__qualname__ += f".{hashlib.sha256(key.encode()).hexdigest()[:16]}"
+        self._compiled: Any = lean_kernel(function)
         self._more, self._addresses = more, dict[Any, int]()
 
     def address(self, session: Any) -> int:
@@ -277,13 +279,9 @@ class KernelCache(FunctionCache):
     ``NUMBA_CACHE_DIR`` also those of other installations.
     """
 
-    def __init__(self, function: Callable[..., Any], key: str) -> None:
-        super().__init__(function)
-        self._key = key
-
     def _index_key(self, sig: Any, codegen: Any) -> Any:
-        # Sources are part of the file's name.
-        return sig, codegen.magic_tuple(), self._key
+        # The sources stand for what a function closes over.
+        return sig, codegen.magic_tuple()
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
         """Look machine code up; None if it is missing or damaged."""
