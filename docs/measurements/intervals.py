@@ -79,9 +79,10 @@ def mean_distance(rng: np.random.Generator, trials: int) -> Estimate:
     """Mean distance of one seed: few trials end far away."""
     near, far = rng.uniform(0.02, 0.05, trials), rng.uniform(0.1, 0.6, trials)
     distance = np.where(rng.random(trials) < FAILING, far, near)
-    none = np.zeros(trials, bool)
+    none, unknown = np.zeros(trials, bool), np.zeros(0)
     ended = {"success": distance <= 0.05, "collision": none, "steps": none, "returns": none}
-    did = SimpleNamespace(distance=distance, **ended)
+    more = dict.fromkeys(("turn", "goals_reached", "interventions"), unknown)
+    did = SimpleNamespace(distance=distance, **ended, **more)
     return estimate_metrics(Outcomes((did,)))["mean_distance"]
 
 

@@ -7,7 +7,7 @@ import pytest
 from known_arms import INSTALLED
 from numba import njit
 
-from docs.measurements import motionbenchmaker
+from docs.measurements import intervals, motionbenchmaker
 from docs.measurements.counting import OperationCounter
 from kinarm.arm import Arm
 from kinarm.kernels.network import affine_layer
@@ -35,6 +35,14 @@ def test_layer_takes_a_product_and_a_sum_for_each_weight():
     weights, inputs, outputs = np.zeros(49 * 5), np.zeros((1, 48)), np.zeros((1, 5))
     found = counted(affine_layer.py_func, weights, 0, 48, 5, inputs, 0, outputs, 0)
     assert found == {"sums": 48 * 5, "products": 48 * 5}
+
+
+def test_all_tables_of_intervals_are_printed(monkeypatch, capsys):
+    monkeypatch.setattr("sys.argv", ["intervals", "--times", "2"])
+    intervals.main()
+    printed = capsys.readouterr().out
+    rows = {"| seeds |": 2, "| 10 |": 15, "| mean distance, ": 1}
+    assert {row: printed.count(row) for row in rows} == rows
 
 
 class TestMuJoCo:
