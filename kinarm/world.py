@@ -99,7 +99,7 @@ class World(GoalKinematics, StepContact):
 
     def __getstate__(self) -> dict[str, Any]:
         # A copy may get other rules or bodies, and needs its own work space.
-        own = ("records", "layout", "stages")
+        own = ("records", "layout", "_stages")
         kept = {name: value for name, value in self.__dict__.items() if name not in own}
         return kept | {"_idle": []}
 
@@ -115,7 +115,7 @@ class World(GoalKinematics, StepContact):
         return recorded(self.arm.chain), recorded(shapes), recorded(self.rules)
 
     @cached_property
-    def stages(self) -> tuple[Stage, Stage, Stage]:
+    def _stages(self) -> tuple[Stage, Stage, Stage]:
         """What writes observations, runs networks and replaces steps; see `Session`."""
         return observer(tuple(self.layout.places)), ACT_BY_NETWORKS, REPLACE_STEP
 
@@ -308,7 +308,7 @@ class World(GoalKinematics, StepContact):
 
     def session(self, control: Control, episodes: Episodes) -> Session:
         """Bind episodes and their source of actions for the kernels."""
-        return Session(*self.records, recorded(control), recorded(episodes), self.stages)
+        return Session(*self.records, recorded(control), recorded(episodes), self._stages)
 
     def _screen_some(self, first: int, last: int, *arrays: Any) -> int:
         """Screen some rows, with work space for this thread alone."""
