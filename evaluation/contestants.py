@@ -57,9 +57,9 @@ class Contestant:
     ----------
     name : str
         Name in tables.
-    run : callable
-        Runs a set of trials; with ``record``, it keeps the configurations
-        visited.
+    rollout : callable
+        Runs a set of trials, without a shield of its own; with ``record``, it
+        keeps the configurations visited.
     algorithm, recipe, seed : str, str, int or None
         How it was made, and its training seed.
     policy, source : Policy or None, Path or None
@@ -74,7 +74,7 @@ class Contestant:
     """
 
     name: str
-    run: Callable[..., Rollouts]
+    rollout: Callable[..., Rollouts]
     algorithm: str
     recipe: str
     seed: int | None = None
@@ -85,6 +85,12 @@ class Contestant:
     has_shield: bool = False
     wrapped: bool = False
 
+    def run(self, trials: TrialSet, *, record: bool = False) -> Rollouts:
+        """Run trials, behind its shield if it has one; ``record`` keeps the paths."""
+        if self.has_shield:
+            trials = replace(trials, simulator=trials.simulator.shielded())
+        return self.rollout(trials, record=record)
+
     def shielded(self) -> "Contestant":
         """The same behind a shield (``kinarm.shield``), under a name of its own.
 
@@ -93,12 +99,8 @@ class Contestant:
         if self.has_shield or self in UNTRAINED.values():
             return self
         group = group_of(self.name)
-        return replace(
-            self,
-            name=f"{group}{SHIELDED}{self.name.removeprefix(group)}",
-            run=partial(_run_shielded, self.run),
-            has_shield=True,
-        )
+        name = f"{group}{SHIELDED}{self.name.removeprefix(group)}"
+        return replace(self, name=name, has_shield=True)
 
     def bare(self) -> "Contestant":
         """A policy that learnt behind a shield without it; what others are called stays."""
@@ -231,10 +233,8 @@ class Contestant:
         if self.actor is None:
             return self
         remarks = (*self.remarks, f"in wrapper {name}")
-        run = partial(run_wrapped, self.actor, wrapper)
-        if self.has_shield:
-            run = partial(_run_shielded, run)
-        return replace(self, run=run, remarks=remarks, wrapped=True)
+        rollout = partial(run_wrapped, self.actor, wrapper)
+        return replace(self, rollout=rollout, remarks=remarks, wrapped=True)
 
 
 def _run(actor: Policy | PolicyFunction, trials: TrialSet, *, record: bool = False) -> Rollouts:
@@ -253,12 +253,6 @@ def _run_random(trials: TrialSet, *, record: bool = False) -> Rollouts:
     generators = [trial_generator(trials.seed, trial, stream=1) for trial in range(len(trials))]
     actions = np.array([generator.uniform(-1, 1, shape) for generator in generators])
     return simulator.rollout_actions(actions, trials.starts, trials.goals, record=record)
-
-
-def _run_shielded(
-    run: Callable[..., Rollouts], trials: TrialSet, *, record: bool = False
-) -> Rollouts:
-    return run(replace(trials, simulator=trials.simulator.shielded()), record=record)
 
 
 def _run_oracle(trials: TrialSet, *, record: bool = False) -> Rollouts:
