@@ -10,7 +10,6 @@ import time
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field
-from itertools import chain, repeat
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -92,9 +91,12 @@ class TrainedRun:
     @property
     def timed_curve(self) -> list[tuple[CurvePoint, float, float]]:
         """Points and end of the curve, with wall and processor times [s], or NaN."""
-        clock, unknown = self.clock, repeat(math.nan)
-        columns = (chain(times, unknown) for times in (clock.points, clock.processor_points))
-        timed = list(zip(self.curve, *columns, strict=False))
+        clock, unknown = self.clock, (math.nan,) * len(self.curve)
+        columns = [
+            times if len(times) == len(self.curve) else unknown
+            for times in (clock.points, clock.processor_points)
+        ]
+        timed = list(zip(self.curve, *columns, strict=True))
         if not self.curve or self.curve[-1].iteration < self.last.iteration:
             known = clock.seconds or math.nan, clock.processor_seconds or math.nan
             timed.append((self.last, *known))

@@ -207,7 +207,7 @@ class Study:
         """Read the folder again."""
         if self.experiment.search:
             self.runs = self._planned()
-        for name in ("finished", "bounds"):
+        for name in ("finished", "bounds", "_groups"):
             self.__dict__.pop(name, None)
 
     def status(self) -> list[str]:
@@ -263,6 +263,10 @@ class Study:
 
     def groups(self) -> tuple[Group, ...]:
         """The finished trainings, in groups that differ in the seed alone."""
+        return self._groups
+
+    @cached_property
+    def _groups(self) -> tuple[Group, ...]:
         shared: dict[tuple[str, str], list[Run]] = {}
         for run in self.finished:
             config = {k: v for k, v in run.settings["config"].items() if k != "seed"}
