@@ -23,8 +23,9 @@ from kinarm.kernels.goal_parts import (
 )
 from kinarm.kernels.kinematics import to_world
 from kinarm.kernels.plant import COMMAND
-from kinarm.kernels.session import POSES, Session
+from kinarm.kernels.session import Session
 from kinarm.kernels.surroundings import NEAR, Seen, write_obstacles, write_proximity
+from kinarm.kernels.work_space import POSES
 from kinarm.observation_part import ACTUATED, JOINTS, ONCE, SLOTS, Part, Ranges
 from kinarm.scene import Scene
 

@@ -23,8 +23,9 @@ from kinarm.kernels.network import ACT_BY_NETWORKS
 from kinarm.kernels.records import recorded
 from kinarm.kernels.rollout import begin
 from kinarm.kernels.screening import screen
-from kinarm.kernels.session import Alone, Block, Session, furnish, work_space
+from kinarm.kernels.session import Session
 from kinarm.kernels.shield import REPLACE_STEP
+from kinarm.kernels.work_space import Alone, Block, furnish, work_space
 from kinarm.observation import observer
 from kinarm.observation_layout import ObservationLayout
 from kinarm.problem import ProblemLike, ReachProblem

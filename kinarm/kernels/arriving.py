@@ -16,7 +16,7 @@ from kinarm.kernels.goals import GoalRules, turn_between, write_reached
 from kinarm.kernels.kinematics import to_world
 from kinarm.kernels.lanes import any_lane, as_numbers, select
 from kinarm.kernels.reward import ROTATION, add_reward
-from kinarm.kernels.session import Block
+from kinarm.kernels.work_space import Block
 
 
 @inlined

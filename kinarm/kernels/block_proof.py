@@ -6,7 +6,8 @@ from kinarm.kernels.compiling import Array, helper
 from kinarm.kernels.kinematics import forward_kinematics, place_bodies
 from kinarm.kernels.lanes import any_lane, lane_bits
 from kinarm.kernels.proof import first_contact, is_apart, prove_alone, prove_step, renew_planes
-from kinarm.kernels.session import Block, Session
+from kinarm.kernels.session import Session
+from kinarm.kernels.work_space import Block
 
 
 @helper

@@ -68,7 +68,7 @@ def _called_by_python(function: Function, **more: Any) -> Function:
 class Stage:
     """A part of kernels that they call by its address (`call_stage`), compiled if a session has it.
 
-    So what an episode does without costs no time to compile, and what it does otherwise, little.
+    What a session lacks is not compiled, and what it does in its own way is compiled alone.
 
     Parameters
     ----------

@@ -16,7 +16,7 @@ from kinarm.kernels.elementary import exponential, nearest_whole, sine_cosine
 from kinarm.kernels.kinematics import forward_kinematics
 from kinarm.kernels.lanes import any_lane, as_numbers, select
 from kinarm.kernels.placing import STEP, mixed, seed_state, uniform
-from kinarm.kernels.session import Block
+from kinarm.kernels.work_space import Block
 from kinarm.plant import PlantDraws
 
 SEED = 0xBF58476D1CE4E5B9

@@ -16,7 +16,7 @@ from kinarm.kernels.lane_copies import moving_frame, place_between, put, take, t
 from kinarm.kernels.lanes import any_lane, as_numbers, lane_bits, select
 from kinarm.kernels.overlap import overlap
 from kinarm.kernels.planes import DEPTH, EVERYDAY, FINE, GAP, height_above, propose, separate
-from kinarm.kernels.session import Alone, Block
+from kinarm.kernels.work_space import Alone, Block
 
 MARGIN = 2e-6
 """Distance beyond which freedom is claimed [m].

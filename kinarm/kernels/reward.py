@@ -9,7 +9,8 @@ import math
 from kinarm.kernels.compiling import Array, call_stage, inlined
 from kinarm.kernels.kinematics import to_world
 from kinarm.kernels.lanes import select
-from kinarm.kernels.session import OBSERVE, Block, Session
+from kinarm.kernels.session import OBSERVE, Session
+from kinarm.kernels.work_space import Block
 
 PROGRESS, CLOSER, STEP, COLLISION, SUCCESS, ROTATION = range(6)
 """Columns of the terms; `COLLISION` and `SUCCESS` are paid at the end.

@@ -12,7 +12,7 @@ from kinarm.kernels.lanes import LANES, lane_bits
 from kinarm.kernels.overlap import deepest_overlap
 from kinarm.kernels.planes import DEPTH
 from kinarm.kernels.proof import prove_configurations
-from kinarm.kernels.session import Alone, Block
+from kinarm.kernels.work_space import Alone, Block
 
 
 @lean_kernel

@@ -29,17 +29,10 @@ from kinarm.kernels.lane_copies import (
 )
 from kinarm.kernels.lanes import LANES, as_numbers, lane_bits, select
 from kinarm.kernels.planes import FINE, GAP, height_above, separate
-from kinarm.kernels.plant import (
-    COMMAND,
-    DELAY,
-    OFFSETS,
-    RATE,
-    STEADY,
-    VELOCITY,
-    move_joints,
-)
+from kinarm.kernels.plant import COMMAND, DELAY, OFFSETS, RATE, STEADY, VELOCITY, move_joints
 from kinarm.kernels.proof import is_apart
-from kinarm.kernels.session import POSES, Block, Session
+from kinarm.kernels.session import Session
+from kinarm.kernels.work_space import POSES, Block
 
 REFUSED, REPLACED = 1, 2
 """States of a step that is to be replaced, as Coal refuses it, and of one that is (`Episodes`)."""

@@ -7,7 +7,7 @@ from kinarm.contact_shapes import WITH_HALFSPACE, ContactShapes
 from kinarm.kernels.compiling import Array
 from kinarm.kernels.lanes import LANES
 from kinarm.kernels.records import recorded
-from kinarm.kernels.session import furnish, work_space
+from kinarm.kernels.work_space import furnish, work_space
 from kinarm.policies.planning.kernels.sweeping import sweep
 from kinarm.step_contact import first_share
 from kinarm.world import World

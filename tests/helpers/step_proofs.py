@@ -8,7 +8,7 @@ from kinarm.kernels.lane_copies import put
 from kinarm.kernels.lanes import LANES, as_numbers
 from kinarm.kernels.planes import EVERYDAY, GAP, height_above, propose
 from kinarm.kernels.proof import first_contact, prove_alone, prove_step, renew_planes
-from kinarm.kernels.session import furnish, work_space
+from kinarm.kernels.work_space import furnish, work_space
 
 
 @njit

@@ -20,7 +20,7 @@ from kinarm.kernels.kinematics import POSE, place_bodies, point_jacobian
 from kinarm.kernels.lane_copies import put, take
 from kinarm.kernels.lanes import LANES, any_lane, as_numbers, lane_bits, lanes
 from kinarm.kernels.records import Fixed, Layout
-from kinarm.kernels.session import ONE, THREE
+from kinarm.kernels.work_space import ONE, THREE
 from kinarm.policies.oracle.kernels.box_proofs import (
     closest_step,
     curved_bound,

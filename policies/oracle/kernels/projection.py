@@ -16,7 +16,7 @@ from kinarm.kernels.kinematics import POSE, forward_kinematics, point_jacobian, 
 from kinarm.kernels.lane_copies import put, take
 from kinarm.kernels.lanes import LANES, as_numbers, lane_bits, lanes, select
 from kinarm.kernels.records import Fixed, Layout
-from kinarm.kernels.session import ONE, THREE
+from kinarm.kernels.work_space import ONE, THREE
 from kinarm.policies.oracle.kernels.rotation import Turn
 
 ITERATIONS = 24

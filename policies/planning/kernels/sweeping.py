@@ -16,7 +16,7 @@ from kinarm.kernels.planes import (
     surface,
 )
 from kinarm.kernels.proof import first_contact, is_apart, prove_alone, twist_step
-from kinarm.kernels.session import Alone, Block
+from kinarm.kernels.work_space import Alone, Block
 
 THROUGHOUT = 0
 """No configurations are tested, but all of the motion."""

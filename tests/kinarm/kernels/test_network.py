@@ -11,7 +11,7 @@ from kinarm.kernels.compiling import call_stage
 from kinarm.kernels.lanes import LANES, as_numbers
 from kinarm.kernels.network import ACT_BY_NETWORKS, shared_policy
 from kinarm.kernels.records import recorded
-from kinarm.kernels.session import work_space
+from kinarm.kernels.work_space import work_space
 from kinarm.networks import Layer, Mirror, Networks, network_control
 from kinarm.policies.arm_policy import activated
 
