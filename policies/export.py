@@ -16,7 +16,6 @@ from kinarm._files import absolute, check_folder, shipped_files, write_atomicall
 from kinarm.arm import Arm
 from kinarm.contact_statistics import random_configurations
 from kinarm.errors import InvalidInputError, OutputError, PolicyFileError, finite_array
-from kinarm.kernels.compiling import Array
 from kinarm.policies import arm_policy, self_test
 from kinarm.policies.conversion.to_torch import command_module, onnx_model
 from kinarm.policies.policy import Policy
@@ -106,13 +105,30 @@ def export_policy(
     return contract
 
 
-def _wiring(arm: Arm, sign: ArrayLike | None, offset: ArrayLike | None) -> tuple[Array, Array]:
-    """Checked signs and offsets of the joints."""
+def _joints(arm: Arm, sign: ArrayLike | None, offset: ArrayLike | None) -> list[dict[str, Any]]:
+    """What is to be known of each joint; checks signs and offsets."""
     shape = (arm.n_joints,)
     signs = np.ones(shape) if sign is None else finite_array("sign", sign, shape)
     if (np.abs(signs) != 1.0).any():
         raise InvalidInputError(f"sign must be 1 or -1 for each joint, got {signs.tolist()}")
-    return signs, np.zeros(shape) if offset is None else finite_array("offset", offset, shape)
+    offsets = np.zeros(shape) if offset is None else finite_array("offset", offset, shape)
+    slides = arm.chain.prismatic.tolist()
+    columns = {
+        "name": arm.joint_names,
+        "kind": ["prismatic" if slide else "revolute" for slide in slides],
+        "unit": ["m" if slide else "rad" for slide in slides],
+        "actuated": [joint < arm.n_actuated for joint in range(arm.n_joints)],
+        "lower": arm.lower.tolist(),
+        "upper": arm.upper.tolist(),
+        "velocity_limit": arm.velocity_limits.tolist(),
+        "home": arm.home.tolist(),
+        "sign": signs.tolist(),
+        "offset": offsets.tolist(),
+        **{each: getattr(arm.chain, each).tolist() for each in ("translation", "rotation", "axis")},
+    }
+    return [
+        {name: column[joint] for name, column in columns.items()} for joint in range(arm.n_joints)
+    ]
 
 
 def contract_of(
@@ -131,22 +147,7 @@ def contract_of(
     if layout.sees_bodies:
         seen = [name for name in ("proximity", "obstacles") if name in layout.places]
         raise InvalidInputError(f"the policy sees {' and '.join(seen)}: it needs kinarm to run")
-    signs, offsets = _wiring(arm, sign, offset)
     task, plant, dt, rules = problem.task, problem.plant, problem.stepping.time_step, world.rules
-    slides = arm.chain.prismatic.tolist()
-    columns = {
-        "name": arm.joint_names,
-        "kind": ["prismatic" if slide else "revolute" for slide in slides],
-        "unit": ["m" if slide else "rad" for slide in slides],
-        "actuated": [joint < arm.n_actuated for joint in range(arm.n_joints)],
-        "lower": arm.lower.tolist(),
-        "upper": arm.upper.tolist(),
-        "velocity_limit": arm.velocity_limits.tolist(),
-        "home": arm.home.tolist(),
-        "sign": signs.tolist(),
-        "offset": offsets.tolist(),
-        **{each: getattr(arm.chain, each).tolist() for each in ("translation", "rotation", "axis")},
-    }
     tool = {"position": arm.chain.tool, "rotation": rules.goal.frame, "axis": rules.goal.axis}
     parts = [
         {"name": part.name, "length": layout.length(part), "unit": part.unit, "is": part.meaning}
@@ -167,10 +168,7 @@ def contract_of(
         "problem": {"name": problem.name, "digest": problem.digest},
         "arm": {"name": arm.name, "digest": arm.digest, "tool_frame": arm.tool_frame},
         "frames": FRAMES,
-        "joints": [
-            {name: column[joint] for name, column in columns.items()}
-            for joint in range(arm.n_joints)
-        ],
+        "joints": _joints(arm, sign, offset),
         "tool": {name: array.tolist() for name, array in tool.items()},
         "time_step": dt,
         "rate": 1.0 / dt,
