@@ -38,6 +38,8 @@ from kinarm.world import World
 EPISODES = 512
 ROBOT_ITERATIONS = 20
 """Iterations of ARS after which a policy no longer acts at random."""
+TESTED = 4
+"""Configurations of a step that both simulators test: MuJoCo cannot test its whole motion."""
 SINGLE_STEPS, VECTOR_STEPS = 500, 100
 LEVEL, TRIALS, BUDGET, BETWEEN = 0.5, 200, 60.0, 0.25
 """Share of trials at which a training is over, how many trials there are, the time after which
@@ -83,13 +85,13 @@ def compare_mujoco(policy: Policy, repetitions: int) -> Iterator[Comparison]:
     ur5 = recipe(
         "ars",
         "paper",
-        problem=PROBLEMS["right"].replace(arm=of_hulls("ur5"), tested_configurations=4),
+        problem=PROBLEMS["right"].replace(arm=of_hulls("ur5"), tested_configurations=TESTED),
         iterations=ROBOT_ITERATIONS,
     )
     novice = train_policy(ur5).policy
     for arm, each in ((f"arm `{policy.problem.arm.name}`", policy), ("UR5 with hulls", novice)):
-        simulator = Simulator(each.problem)
-        stepping = each.problem.stepping
+        simulator = Simulator(each.problem.replace(tested_configurations=TESTED))
+        stepping = simulator.problem.stepping
         scenarios = simulator.sample(np.random.default_rng(EPISODES), EPISODES)
         targets = joint_targets(simulator, each, *scenarios)
 
@@ -102,8 +104,8 @@ def compare_mujoco(policy: Policy, repetitions: int) -> Iterator[Comparison]:
             "step; for more tests of contact MuJoCo takes smaller steps. It solves the dynamics "
             "and resolves contact; kinarm also observes and runs the policy"
         )
-        for tests in dict.fromkeys((stepping.tested_configurations, 1)):
-            both = tests == stepping.tested_configurations
+        for tests in dict.fromkeys((TESTED, 1)):
+            both = tests == TESTED
             how = f"both test {tests}" if both else f"{tests} tested by MuJoCo"
             with driven(simulator, scenarios[0], targets, tests) as theirs:
                 what = f"rollouts, {arm}, {how} a step"
