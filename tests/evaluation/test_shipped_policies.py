@@ -38,8 +38,6 @@ def test_all_of_them_ship_and_nothing_else():
 
 
 RECEIVED = asdict(RewardWeights())
-GONE = {"initial_start_spread": 1.0, "initial_penalty": 1.0, "widening": 0.0}
-"""Settings that are gone, at the values at which they did nothing."""
 
 
 def settings_of(config):
@@ -59,9 +57,8 @@ def settings_of(config):
 def assert_made_by(config, made):
     """Settings that have come since it was trained had no other value then."""
     released = settings_of(config)
-    config = {name: value for name, value in made.config.items() if GONE.get(name) != value}
-    reward = {**RECEIVED, **config.get("reward", asdict(made.problem.task.reward))}
-    assert {**released, **config, "reward": reward} == released
+    reward = {**RECEIVED, **made.config.get("reward", asdict(made.problem.task.reward))}
+    assert {**released, **made.config, "reward": reward} == released
     assert made.commit
     assert not made.commit.endswith("-dirty"), "trained from changed sources"
 
@@ -131,14 +128,14 @@ def test_symmetric_policies_treat_mirror_images_alike():
     ("group", "floor"),
     [
         ("ars-tuned", 0.94),
-        ("ars-linear", 0.95),
+        ("ars-linear", 0.96),
         ("ars-best", 0.975),
         ("ppo-best", 0.99),
     ],
 )
 def test_policies_reach(group, problem, floor):
-    """300 trials with a seed not used in training; the mean over training seeds."""
-    trials = TrialSet.draw(problem, 300, seed=12345)
+    """1000 trials with a seed not used in training; the mean over training seeds."""
+    trials = TrialSet.draw(problem, 1000, seed=12345)
     rates = [
         run_trials(contestant, trials).success.value
         for contestant in find_contestants(f"{group}-both")
