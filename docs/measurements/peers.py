@@ -91,22 +91,20 @@ def compare_mujoco(policy: Policy, repetitions: int) -> Iterator[Comparison]:
     novice = train_policy(ur5).policy
     for arm, each in ((f"arm `{policy.problem.arm.name}`", policy), ("UR5 with hulls", novice)):
         simulator = Simulator(each.problem.replace(tested_configurations=TESTED))
-        stepping = simulator.problem.stepping
         scenarios = simulator.sample(np.random.default_rng(EPISODES), EPISODES)
         targets = joint_targets(simulator, each, *scenarios)
+        seconds = simulator.problem.stepping.time_step
 
         def ours(simulator=simulator, each=each, scenarios=scenarios) -> int:
             return int(simulator.rollout(each, *scenarios).steps.sum())
 
         terms = (
             f"{EPISODES} episodes on {simulator.threads} threads; same starts, shapes, pairs of "
-            f"bodies and joint targets, which position servos follow, {stepping.time_step:g} s a "
+            f"bodies and joint targets, which position servos follow, {seconds:g} s a "
             "step; for more tests of contact MuJoCo takes smaller steps. It solves the dynamics "
             "and resolves contact; kinarm also observes and runs the policy"
         )
-        for tests in dict.fromkeys((TESTED, 1)):
-            both = tests == TESTED
-            how = f"both test {tests}" if both else f"{tests} tested by MuJoCo"
+        for tests, how in ((TESTED, f"both test {TESTED}"), (1, "1 tested by MuJoCo")):
             with driven(simulator, scenarios[0], targets, tests) as theirs:
                 what = f"rollouts, {arm}, {how} a step"
                 yield compared(theirs, ours, repetitions, what=what, terms=terms)
