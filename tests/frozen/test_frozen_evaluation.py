@@ -1,6 +1,4 @@
-"""An evaluation's document, table and report say what those of version 1.0.0 said.
-
-Differences are new, and intervals of a later kind.
+"""An evaluation's document, table and report say what they said when other policies last shipped.
 
 Recorded by ``kinarm-eval --policy ppo-paper-right random --problem right --trials 10 --hold``, but
 for the command, versions and commit.
