@@ -108,6 +108,8 @@ def rows_of(evaluations: Sequence[Evaluation]) -> list[dict[str, Any]]:
 def _row(name: str, members: Sequence[Evaluation]) -> dict[str, Any]:
     policy, outcomes = members[0].contestant.policy, outcomes_of(members)
     hits = np.array([each.rollouts.success for each in members])
+    trained = [each.contestant.policy for each in members if each.contestant.policy]
+    steps = [each.provenance.environment_steps for each in trained]
     return {
         "policy": name,
         "problem": members[0].problem.name,
@@ -121,7 +123,7 @@ def _row(name: str, members: Sequence[Evaluation]) -> dict[str, Any]:
             for each in members
         },
         "parameters": policy and sum(each.size for each in policy.networks().parameters),
-        "training_steps": policy and policy.provenance.environment_steps,
+        "training_steps": int(np.median(steps)) if steps else None,
         "failures": _failures(members),
     }
 
