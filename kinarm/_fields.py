@@ -139,7 +139,7 @@ def _value(hint: Any, entry: Any, where: str, path: str, kind: type) -> Any:
     choices = alternatives(hint)
     if isinstance(entry, np.ndarray | np.generic):
         entry = entry.tolist()
-    if entry is None and choices != (hint,):
+    if entry is None and type(None) in get_args(hint):
         return None
     tables = [choice for choice in choices if is_dataclass(choice) and isinstance(choice, type)]
     if isinstance(entry, tuple(tables)):
@@ -179,7 +179,9 @@ def _is_scalar(hint: Any, entry: object) -> bool:
         return isinstance(entry, str | Path)
     if hint is bool or isinstance(entry, bool):
         return hint is bool and isinstance(entry, bool)
-    return isinstance(entry, int | float) if hint is float else type(entry) is hint
+    if hint is float:
+        return isinstance(entry, float) or (isinstance(entry, int) and abs(entry) < 1e300)
+    return type(entry) is hint
 
 
 def expected(hint: Any) -> str:

@@ -259,7 +259,7 @@ def reading(
     """
     try:
         yield
-    except (error, AssertionError):
+    except error:
         raise
     except OSError as problem:
         raise error(f"cannot read {kind} {name}: {problem.strerror}") from problem

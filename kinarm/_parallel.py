@@ -18,8 +18,8 @@ SHARED_STEPS = 2048
 LONG_STEPS = 5_000_000
 """Work of some seconds, at most, that the calling thread does without hearing of Ctrl-C."""
 
-NO_MORE = 2**62
-"""Number of a row that no batch has."""
+NO_MORE = 2**56
+"""Number of a row that no batch has, nor rows of which it is the number of a group of lanes."""
 
 
 def available_threads() -> int:
@@ -51,26 +51,26 @@ def run_rows(
 def run_together(
     kernel: Callable[..., int], work: int, threads: int, given: Callable[[int], Any], *arrays: Any
 ) -> int:
-    """Call ``kernel(counters, given(thread), *arrays)`` on several threads; add up the results.
+    """Call ``kernel(counter, given(thread), *arrays)`` on several threads; add up the results.
 
     By a counter, zero at first, kernels share the rows as long as there are any. The calling thread
     is number 0. If it hears of interruptions, it waits where the work is long (see `run_rows`), and
     they end it after the rows under way. A thread that comes too late is not awaited.
     """
-    counters = np.zeros(1, dtype=np.int64)
+    counter = np.zeros(1, dtype=np.int64)
     waits = work > LONG_STEPS and current_thread() is main_thread()
     if work < SHARED_STEPS or (threads == 1 and not waits):
-        return kernel(counters, given(0), *arrays)
+        return kernel(counter, given(0), *arrays)
     pool = thread_pool(os.getpid(), threads)
     helpers = [
-        pool.submit(kernel, counters, given(thread), *arrays)
+        pool.submit(kernel, counter, given(thread), *arrays)
         for thread in range(0 if waits else 1, threads)
     ]
     try:
-        total = helpers.pop(0).result() if waits else kernel(counters, given(0), *arrays)
+        total = helpers.pop(0).result() if waits else kernel(counter, given(0), *arrays)
         return total + sum(helper.result() for helper in helpers if not helper.cancel())
     except BaseException:
-        counters[0] = NO_MORE
+        counter[0] = NO_MORE
         raise
 
 

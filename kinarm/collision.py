@@ -78,7 +78,7 @@ class Step:
     def motion(self) -> NDArray[np.float64]:
         """Largest motion of the bodies of each pair against each other, shape (n_pairs,) [m]."""
         shapes = self.model.shapes
-        moved = np.abs(self.end - self.start)[: len(shapes.travel), None]
+        moved = np.abs(self.end - self.start)[:, None]
         motion: NDArray[np.float64] = (moved * shapes.travel).sum(axis=0)
         if self.before is not None and self.after is not None:
             ways = np.linalg.norm(self.after[:, 13:] - self.before[:, 13:], axis=1)
@@ -122,10 +122,11 @@ class ContactModel:
             array.flags.writeable = False
 
     @classmethod
-    def build(cls, arm: Arm, scene: Scene) -> "ContactModel":
+    def build(cls, arm: Arm, scene: Scene, *, loose: bool = False) -> "ContactModel":
         """Place an arm in a scene and choose the pairs to test.
 
-        Raises ProblemError if the first link touches an obstacle wherever its joint is.
+        Loose obstacles may be put anywhere, also against the base. Raises ProblemError if the first
+        link touches an obstacle wherever its joint is.
         """
         geometry = arm.geometry.copy()
         n_shapes = geometry.ngeoms
@@ -133,12 +134,14 @@ class ContactModel:
             place = pin.SE3(body.rotation, np.array(body.position))
             geometry.addGeometryObject(pin.GeometryObject(body.name, 0, place, coal_shape(body)))
         surroundings = [shape.name for shape in geometry.geometryObjects][n_shapes:]
-        candidates = candidate_pairs(arm, geometry, n_shapes)
+        fixed = n_shapes + len(scene.obstacles)
+        placed = range(n_shapes, fixed if loose else n_shapes)
+        candidates = candidate_pairs(arm, geometry, n_shapes, placed)
         for pair in candidates:
             geometry.addCollisionPair(pin.CollisionPair(*pair))
         names = (*body_names(arm), *surroundings)
-        fixed = n_shapes + len(scene.obstacles)
         random = range(fixed, fixed + sum(each.count[1] for each in scene.random_bodies))
+        random = range(n_shapes, random.stop) if loose else random
         dropped = uninformative_pairs(arm, geometry, n_shapes, names, random)
         kept = [pair for index, pair in enumerate(candidates) if index not in dropped]
         geometry.removeAllCollisionPairs()

@@ -68,8 +68,13 @@ def are_neighbours(arm: Arm, first: pin.GeometryObject, second: pin.GeometryObje
     return apart == 1 and not held & {link_of(first), link_of(second)}
 
 
-def candidate_pairs(arm: Arm, geometry: pin.GeometryModel, n_shapes: int) -> list[tuple[int, int]]:
-    """All pairs that move against each other, but those that are allowed."""
+def candidate_pairs(
+    arm: Arm, geometry: pin.GeometryModel, n_shapes: int, loose: range
+) -> list[tuple[int, int]]:
+    """All pairs that move against each other, but those that are allowed.
+
+    Among them are the base and loose obstacles that it does not stand on.
+    """
     shapes = list(geometry.geometryObjects)
     parent, links = [shape.parentJoint for shape in shapes], list(map(link_of, shapes))
     allowed = {frozenset(contact.links) for contact in arm.allowed_contacts}
@@ -80,7 +85,12 @@ def candidate_pairs(arm: Arm, geometry: pin.GeometryModel, n_shapes: int) -> lis
             pairs.append((first, second) if parent[first] < parent[second] else (second, first))
     moving = [shape for shape in range(n_shapes) if parent[shape] > 0]
     flat = [isinstance(each.geometry, coal.Halfspace) for each in shapes]
-    with_world = product(moving, range(n_shapes, geometry.ngeoms))
+    with_world = [*product(moving, range(n_shapes, geometry.ngeoms))]
+    for pair in product((shape for shape in range(n_shapes) if parent[shape] == 0), loose):
+        base, obstacle = (shapes[each] for each in pair)
+        placed = (base.geometry, base.placement, obstacle.geometry, obstacle.placement)
+        if not coal.collide(*placed, coal.CollisionRequest(), coal.CollisionResult()):
+            with_world.append(pair)
     # Kind after kind, which the kernels find easier to predict.
     return pairs + sorted(with_world, key=lambda pair: flat[pair[1]])
 
@@ -134,6 +144,17 @@ def uninformative_pairs(
     }
 
 
+def random_configurations(arm: Arm, count: int, seed: int = 0) -> NDArray[np.float64]:
+    """Configurations, shape (count, n_joints), actuated joints uniform within their limits.
+
+    Others stay at home [rad or m].
+    """
+    q, moved = np.tile(arm.home, (count, 1)), slice(arm.n_actuated)
+    uniforms = np.random.default_rng(seed).random((count, arm.n_actuated))
+    q[:, moved] = arm.lower[moved] + uniforms * (arm.upper - arm.lower)[moved]
+    return q
+
+
 def close_pairs(arm: Arm, geometry: pin.GeometryModel) -> set[int]:
     """Pairs with a mesh that often are less than `CLOSE` apart."""
     objects = geometry.geometryObjects
@@ -146,11 +167,8 @@ def close_pairs(arm: Arm, geometry: pin.GeometryModel) -> set[int]:
     if not pairs:
         return set()
     data, distances = arm.model.createData(), geometry.createData()
-    rng, often = np.random.default_rng(0), dict.fromkeys(pairs, 0)
-    for _ in range(CLOSENESS_SAMPLES):
-        q = arm.home.copy()
-        moved = slice(arm.n_actuated)
-        q[moved] = rng.uniform(arm.lower[moved], arm.upper[moved])
+    often = dict.fromkeys(pairs, 0)
+    for q in random_configurations(arm, CLOSENESS_SAMPLES):
         pin.updateGeometryPlacements(arm.model, data, geometry, distances, q)
         for index in pairs:
             result = pin.computeDistance(geometry, distances, index)

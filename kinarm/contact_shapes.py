@@ -134,7 +134,7 @@ class ContactShapes(NamedTuple):
         blocks = list(map(corner_blocks, bodies, ends))
         edges, frames = np.cumsum([0, *map(len, blocks)]), np.array(links, dtype=np.int64)
         rows, planes, proxies = [], [], []
-        travel = np.zeros((arm.n_actuated, len(pairs)))
+        travel = np.zeros((arm.n_joints, len(pairs)))
         for column, (first, second) in enumerate(pairs):
             within = second < n_shapes
             kind = BETWEEN_CAPSULES if within else surroundings[second - n_shapes].kind
@@ -150,7 +150,7 @@ class ContactShapes(NamedTuple):
             usual = (closer[carrier], closer[mover]) if column in close else (carrier, mover)
             proxies.append((usual, fine))
             planes.append((carrier, mover, base, last, frame))
-            for axis in range(base, last):
+            for axis in range(base, links[mover]):
                 # The fine polytope has all corners of the coarse one.
                 corners = bodies[finer[mover]].corners
                 travel[axis, column] = point_speed(arm.chain, axis, links[mover], corners)
@@ -174,7 +174,7 @@ class ContactShapes(NamedTuple):
             ).reshape(-1, 2, 3),
             planes=np.array(planes, dtype=np.int64).reshape(-1, 5),
             proxies=np.array(proxies, dtype=np.int64).reshape(-1, 2, 2),
-            farthest=travel.max(axis=1, initial=0.0),
+            farthest=travel[: arm.n_actuated].max(axis=1, initial=0.0),
             placed=np.array(list(map(placed_row, scene.bodies, surroundings))).reshape(-1, 16),
             moving=np.array(scene.moving, dtype=np.int64),
         )

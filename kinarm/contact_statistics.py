@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from kinarm.arm import Arm
 from kinarm.arm_specification import arm_names
 from kinarm.collision import ContactModel
-from kinarm.contact_pairs import TOUCH_AT_HOME, make_verdicts_reliable
+from kinarm.contact_pairs import TOUCH_AT_HOME, make_verdicts_reliable, random_configurations
 from kinarm.errors import ProblemError
 from kinarm.kernels.compiling import Array
 from kinarm.scene import Scene
@@ -37,11 +37,11 @@ class ContactStatistics:
     def sample(
         cls, model: ContactModel, count: int = SAMPLES, scenes: Sequence[Array] = ()
     ) -> "ContactStatistics":
-        """Ask Coal for every pair, at `random_configurations`, each in a scene if there are some.
+        """Ask Coal for every pair, at random configurations, each in a scene if there are some.
 
-        These have the shape (count, n_placed, 16).
+        Scenes have the shape (count, n_placed, 16).
         """
-        q, asked = random_configurations(model, count), model.at(scenes[0]) if scenes else model
+        q, asked = random_configurations(model.arm, count), model.at(scenes[0]) if scenes else model
         data = asked.arm.model.createData()
         geometry_data = make_verdicts_reliable(asked.geometry.createData())
         results = list(geometry_data.collisionResults)
@@ -75,23 +75,6 @@ class ContactStatistics:
                 f"arm {arm!r} cannot move: it touches something at all of {len(self.free)} random "
                 f"configurations, {' and '.join(pair)} at {share:.0%} of them"
             )
-
-
-def random_configurations(model: ContactModel, count: int, seed: int = 0) -> Array:
-    """Configurations, shape (n, n_joints), with actuated joints uniform within their limits.
-
-    Others stay at home.
-
-    Parameters
-    ----------
-    model, count, seed
-        An arm in a scene, their number, and the seed.
-    """
-    arm, moved = model.arm, slice(model.arm.n_actuated)
-    q = np.tile(arm.home, (count, 1))
-    uniforms = np.random.default_rng(seed).random((count, arm.n_actuated))
-    q[:, moved] = arm.lower[moved] + uniforms * (arm.upper - arm.lower)[moved]
-    return q
 
 
 FASTEST = 30.0

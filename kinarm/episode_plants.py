@@ -5,8 +5,15 @@ import numpy as np
 from kinarm._parallel import run_rows
 from kinarm.episode_scenes import bits_of
 from kinarm.kernels.compiling import Array
-from kinarm.kernels.plant import FORMER, OFFSETS, VELOCITY, draw_plants, plant_width
-from kinarm.plant import PlantDraws
+from kinarm.kernels.plant import (
+    FORMER,
+    OFFSETS,
+    SUBSTEPS,
+    VELOCITY,
+    draw_plants,
+    plant_width,
+)
+from kinarm.plant import RANGES
 from kinarm.problem import ReachProblem
 
 
@@ -21,19 +28,20 @@ class EpisodePlants:
 
     def __init__(self, problem: ReachProblem, step_limit: Array) -> None:
         plant, self._n_actions = problem.plant, len(step_limit)
-        self._draws = PlantDraws.of(plant, problem.stepping.time_step, step_limit)
+        ranges = np.array([plant.range_of(name) for name in RANGES], dtype=np.float64)
+        self._draws = ranges, problem.stepping.time_step / SUBSTEPS
         self.width = 0 if plant.ideal else plant_width(self._n_actions)
-        self.rows = 0 if plant.ideal else FORMER + self._draws.longest
+        self.rows = 0 if plant.ideal else FORMER + int(plant.range_of("delay")[1])
 
     def of(self, starts: Array, goals: Array, threads: int) -> Array:
         """Numbers of plants, shape (n, width).
 
-        Takes starts, shape (n, n_joints) [rad or m], goals, shape (n, 3) [m], and the number of
-        threads.
+        Takes starts, shape (n, n_joints) [rad or m], goals, shape (n, goal_width), of which all
+        numbers count, and the number of threads.
         """
         n, bits = len(starts), bits_of(starts, goals)
         plants = np.empty((n, self.width))
-        run_rows(draw_plants, n, n, threads, self._draws, bits, plants)
+        run_rows(draw_plants, n, n, threads, *self._draws, bits, plants)
         return plants
 
     def at_rest(self, plants: Array, q: Array) -> Array:

@@ -69,6 +69,7 @@ class EpisodeRunner:
         session: Session,
         origins: Array | None = None,
         drive: Array | None = None,
+        done: NDArray[np.int64] | int = 0,
     ) -> None:
         """Start some episodes in their scenes; Coal decides about doubtful starts."""
         episodes, contacts = session.episodes, self.world.contact_model
@@ -85,8 +86,8 @@ class EpisodeRunner:
             episodes.scenes[rows] = self.world.scenes_of(begun, goals)
         if len(followers):
             followers[rows] = draw_followers(self.world, begun, goals)
-        if origins is None and not self.world.problem.task.goal.plain:
-            episodes.pursuit.goals_reached[rows] = 0
+        if len(episodes.pursuit.goals_reached):
+            episodes.pursuit.goals_reached[rows] = done
         if not run_together(begin, len(rows), self.threads, session.of_thread, rows):
             return
         paused = rows[episodes.status[rows] == PAUSED]

@@ -3,13 +3,12 @@
 from dataclasses import replace
 
 import numpy as np
-import pinocchio as pin
 from numpy.typing import NDArray
 
 from kinarm._parallel import run_rows
 from kinarm.arm import Arm
 from kinarm.bodies import PARKED, Body
-from kinarm.chain import Chain
+from kinarm.chain import Chain, quaternion_of
 from kinarm.errors import ProblemError
 from kinarm.kernels.compiling import Array
 from kinarm.kernels.placing import ATTEMPTS, draw_scenes
@@ -18,7 +17,7 @@ from kinarm.scene_draws import SceneDraws
 
 
 def bits_of(starts: Array, goals: Array) -> NDArray[np.uint64]:
-    """Bits of goals and starts, shape (n, 3 + n_joints), which decide what an episode draws."""
+    """Bits of goals and starts, shape (n, goal_width + n_joints): they decide what is drawn."""
     return (np.concatenate([goals, starts], axis=1) + 0.0).view(np.uint64)
 
 
@@ -82,5 +81,5 @@ def _moved(body: Body, row: Array) -> Body:
         "cylinder": (x, 2 * z),
         "mesh": (),
     }[body.shape]
-    turn, (x, y, z) = pin.Quaternion(row[4:13].reshape(3, 3)).coeffs().tolist(), row[13:].tolist()
-    return replace(body, size=size, position=(x, y, z), quaternion=(turn[3], *turn[:3]))
+    turn = tuple(quaternion_of(row[4:13].reshape(3, 3)).tolist())
+    return replace(body, size=size, position=tuple(row[13:].tolist()), quaternion=turn)

@@ -34,6 +34,7 @@ TRIALS: Mapping[str, Any] = {"at_most": MOST_TRIALS}
 POSITIVE = {"must": "be greater than 0", "holds": lambda value: value > 0}
 NOT_NEGATIVE = {"must": "not be negative", "holds": lambda value: value >= 0}
 SHARE = {"must": "lie in [0, 1]", "holds": lambda value: 0 <= value <= 1}
+POSITIVE_SHARE = {"must": "lie in (0, 1]", "holds": lambda value: 0 < value <= 1}
 """Ranges of numbers: metadata of fields."""
 
 LARGEST = 1e6

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 StartsAndGoals = tuple[NDArray[np.float64], NDArray[np.float64]]
-"""Starts, shape (n, n_joints) [rad or m], and goals, shape (n, 3) [m]."""
+"""Starts, shape (n, n_joints) [rad or m], and goals, shape (n, goal_width) [m]."""
 
 LARGEST_REPLAY = 1_000_000
 """Largest number of kept scenarios."""

@@ -67,7 +67,7 @@ class GoalSpecification(Checked):
     rotation_tolerance: float = field(default=0.1, metadata={**OPTIONAL, **POSITIVE})
     rotations: tuple[Point, ...] = field(default=(), metadata=OPTIONAL)
     configurations: tuple[tuple[float, ...], ...] = field(default=(), metadata=OPTIONAL)
-    hold: int = field(default=1, metadata=OPTIONAL)
+    hold: int = field(default=1, metadata={**OPTIONAL, "at_most": 1_000_000})
     speed: float | None = field(default=None, metadata=POSITIVE)
     sequence: int = field(default=1, metadata={**OPTIONAL, "at_most": 1000})
     motion: BodyMotion | None = None

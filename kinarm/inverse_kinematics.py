@@ -19,7 +19,8 @@ from kinarm.errors import (
     whole_number,
 )
 from kinarm.kernels.compiling import Array
-from kinarm.kernels.inverse import TURN, Search, solve_targets
+from kinarm.kernels.elementary import TURN
+from kinarm.kernels.inverse import Search, solve_targets
 from kinarm.kernels.kinematics import follow_tool
 from kinarm.randomness import low_discrepancy_points
 
@@ -137,7 +138,8 @@ class InverseKinematics(ABC):
         no more joints move than the target has coordinates: 3 of a position, 5
         with a direction, 6 of a pose. Else, and at singular configurations,
         they are spread over a continuum, 0.2 rad or m apart in some joint. Targets
-        do not affect each other.
+        do not affect each other. Raises InvalidInputError if a shape is wrong, or
+        ``near`` is beyond the limits.
 
         Parameters
         ----------

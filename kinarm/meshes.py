@@ -33,8 +33,8 @@ COUNTS = ("count", "offset", "stride", "set")
 INDICES = re.compile(r"\s*(?:-?\d{1,9}(?:\s+|$))*")
 NUMBERS = re.compile(r"\s*(?:[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?(?:\s+|$))*")
 
-FLAT = 1e-9
-"""Thickness over width of what has no volume."""
+FLAT = 1e-6
+"""Thickness over width of what has no volume, as of `kinarm.Body`."""
 
 VERSION = 2
 """To be raised when the same mesh gets other hulls."""
@@ -226,13 +226,6 @@ def coal_shape(body: "Body") -> coal.CollisionGeometry:
         return coal.Halfspace(np.array([0.0, 0.0, 1.0]), 0.0)
     kinds = {"box": coal.Box, "sphere": coal.Sphere, "capsule": coal.Capsule}
     return kinds.get(body.shape, coal.Cylinder)(*body.size)
-
-
-def box_about(body: "Body") -> NDArray[np.float64]:
-    """Lower and upper corner of a box about a body, in its own frame, shape (2, 3) [m]."""
-    shape = coal_shape(body)
-    shape.computeLocalAABB()
-    return np.array([shape.aabb_local.min_, shape.aabb_local.max_])
 
 
 def enclosing_corners(points: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from kinarm.episodes import Control
-from kinarm.errors import InvalidInputError, UnknownNameError, finite_array
+from kinarm.errors import InvalidInputError, UnknownNameError, finite_array, whole_number
 from kinarm.kernels.compiling import Array
 
 
@@ -108,6 +108,13 @@ class Networks:
                 Layer(checked, finite_array(f"bias of layer {number}", bias, (count, width)))
             )
         activations = checked_activations(self.activations, len(layers))
+        (n_observations, *_), n_actions = layers[0].weights.shape[2:], width
+        if not -1 <= self.rates <= n_observations - n_actions:
+            raise InvalidInputError(f"rates must be the first of {n_actions} observations")
+        if self.mirror is not None:
+            finite_array("mirror of observations", self.mirror.observations, (n_observations,))
+            finite_array("mirror of actions", self.mirror.actions, (n_actions,))
+            whole_number("side of the mirror", self.mirror.side, 0, n_observations - 1)
         object.__setattr__(self, "layers", tuple(layers))
         object.__setattr__(self, "activations", activations)
 

@@ -36,20 +36,17 @@ VERSION = 1
 """To be raised when a part's meaning changes, but not its name and length."""
 
 
-@inlined
-def _write_orientations(session: Session, seen: Seen, start: int, count: int) -> None:
-    """Orientations of the joint frames."""
-    for k in range(count):
-        for i in range(4):
-            session.block.observation[0, start + 4 * k + i] = seen.frames[k + 1, i]
+def _of_frames(first: int, entries: int) -> Any:
+    """The formula of some entries of each joint frame."""
 
+    @inlined
+    def write(session: Session, seen: Seen, start: int, count: int) -> None:
+        for k in range(count):
+            row = start + entries * k
+            for i in range(entries):
+                session.block.observation[0, row + i] = seen.frames[k + 1, first + i]
 
-@inlined
-def _write_positions(session: Session, seen: Seen, start: int, count: int) -> None:
-    """Positions of the joint frames."""
-    for k in range(count):
-        for i in range(3):
-            session.block.observation[0, start + 3 * k + i] = seen.frames[k + 1, 13 + i]
+    return write
 
 
 @inlined
@@ -184,7 +181,7 @@ OBSERVATION = (
         unit="1",
         signs=(1, -1, 1, -1),
         bounds=lambda _: (-UNIT, UNIT),
-        write=_write_orientations,
+        write=_of_frames(0, 4),
         of=JOINTS,
     ),
     Part(
@@ -193,7 +190,7 @@ OBSERVATION = (
         unit="m",
         signs=POLAR,
         bounds=lambda ranges: (-ranges.reach, ranges.reach),
-        write=_write_positions,
+        write=_of_frames(13, 3),
         of=JOINTS,
     ),
     Part(

@@ -1,10 +1,7 @@
 """The plant: what lies between commands and joints, and between joints and what is seen."""
 
 from dataclasses import dataclass, field, fields
-from typing import Any, Literal, NamedTuple
-
-import numpy as np
-from numpy.typing import NDArray
+from typing import Any, Literal
 
 from kinarm._fields import OPTIONAL, Checked, from_plain, read_toml
 from kinarm._files import named_file, shipped_files
@@ -112,7 +109,7 @@ MOST_NOISE = 3.5
 """Largest noise in standard deviations."""
 
 RANGES = tuple(item.name for item in fields(Plant) if item.name != "feedback")
-"""Names of the settings that an episode draws, in the order of `PlantDraws.ranges`."""
+"""Names of the settings that an episode draws, in the order in which kernels have them."""
 
 
 def plant_names() -> tuple[str, ...]:
@@ -122,34 +119,3 @@ def plant_names() -> tuple[str, ...]:
 
 PlantLike = Plant | str | Any
 """A plant, its name or its file."""
-
-
-class PlantDraws(NamedTuple):
-    """How the plants of episodes are drawn, and their sizes, for the kernels.
-
-    Attributes
-    ----------
-    ranges : ndarray, shape (n_ranges, 2)
-        Lower and upper ends of `RANGES`.
-    longest : int
-        Largest delay [steps].
-    time_step : float
-        Duration of a step [s].
-    step_limit : ndarray, shape (n_actuated,)
-        Largest move of each joint in a step [rad or m].
-    """
-
-    ranges: NDArray[np.float64]
-    longest: int
-    time_step: float
-    step_limit: NDArray[np.float64]
-
-    @classmethod
-    def of(cls, plant: Plant, time_step: float, step_limit: NDArray[np.float64]) -> "PlantDraws":
-        """Flatten a plant, for steps of a duration [s] and moves of at most so much."""
-        return cls(
-            ranges=np.array([plant.range_of(name) for name in RANGES], dtype=np.float64),
-            longest=int(plant.range_of("delay")[1]),
-            time_step=time_step,
-            step_limit=step_limit,
-        )

@@ -84,7 +84,7 @@ class ReachProblem(Checked):
 
     @classmethod
     def load(cls, problem: "ProblemLike") -> "ReachProblem":
-        """Find a problem by name, or read it from a file.
+        """Find a problem by name, or read it from a file; KinarmError if there is none such.
 
         Parameters
         ----------
@@ -107,7 +107,7 @@ class ReachProblem(Checked):
         return replace(read, arm=read.arm.resolved(absolute(path).parent))
 
     def replace(self, **overrides: Any) -> "ReachProblem":
-        """Change parts of it.
+        """Change parts of it; KinarmError if one is unknown, or cannot be.
 
         Parameters
         ----------
@@ -198,9 +198,10 @@ class ReachProblem(Checked):
         base = ReachProblem.load(self.name) if shipped else self.replace(plant=Plant())
         found = []
         for part in ("task", "stepping", "plant"):
-            ours, theirs = (to_plain(getattr(problem, part)) for problem in (self, base))
-            changed = (name for name in ours if theirs.get(name) != ours[name])
-            found += [f"{part}.{name} = {ours[name]}" for name in changed]
+            ours, theirs = getattr(self, part), getattr(base, part)
+            values = ((name, getattr(ours, name)) for name in init_fields(type(ours)))
+            changed = [(name, value) for name, value in values if getattr(theirs, name) != value]
+            found += [f"{part}.{name} = {to_plain(value)}" for name, value in changed]
         return found
 
     def first_difference(self, other: "ReachProblem") -> str | None:

@@ -89,7 +89,7 @@ class Recording:
     def __post_init__(self) -> None:
         if self.outcome not in OUTCOMES:
             raise InvalidInputError(f"outcome must be one of {OUTCOMES}, got {self.outcome!r}")
-        whole_number("trial", self.trial, 0)
+        object.__setattr__(self, "trial", whole_number("trial", self.trial, 0))
         states = finite_array("states", self.states, (None, None))
         horizon = self.problem.task.horizon
         if not 1 <= len(states) <= horizon + 1:

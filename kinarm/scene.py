@@ -147,16 +147,16 @@ class Scene(Checked):
     cube_edge: float = field(default=0.05, metadata=NOT_NEGATIVE)
     obstacles: tuple[Obstacle | Body, ...] = PAPER_BENCHES
     random_bodies: tuple[RandomBodies, ...] = field(default=(), metadata=OPTIONAL)
-    seed: int = field(default=0, metadata={**OPTIONAL, **FROM_ZERO})
+    seed: int = field(default=0, metadata={**OPTIONAL, **FROM_ZERO, "at_most": 2**63 - 1})
     goal_regions: tuple[GoalRegion, ...] = PAPER_GOALS
     mount: Mount = field(default_factory=Mount, metadata=OPTIONAL)
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        placed = self.bodies if self.random_bodies else self.obstacles
-        for what, members in (("obstacle", placed), ("goal region", self.goal_regions)):
-            if len(members) > MOST_MEMBERS:
-                raise ProblemError(f"{len(members)} {what}s: at most {MOST_MEMBERS} are possible")
+        for what, members in (("obstacle", self.bodies), ("goal region", self.goal_regions)):
+            count = len(members) - (members is self.bodies and self.ground)
+            if count > MOST_MEMBERS:
+                raise ProblemError(f"{count} {what}s: at most {MOST_MEMBERS} are possible")
             names = [member.name for member in members]
             for name in names:
                 if names.count(name) > 1:

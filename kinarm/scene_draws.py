@@ -7,9 +7,8 @@ from numpy.typing import NDArray
 
 from kinarm.bodies import RandomBodies
 from kinarm.contact_shapes import placed_row, unit_body
-from kinarm.errors import UnknownNameError
+from kinarm.errors import ProblemError, UnknownNameError
 from kinarm.kernels.compiling import Array
-from kinarm.meshes import box_about
 from kinarm.scene import Scene
 
 IN_WORLD, ON_PATH, ON_BODY = range(3)
@@ -63,15 +62,23 @@ class SceneDraws(NamedTuple):
 
     @classmethod
     def of(cls, scene: Scene) -> "SceneDraws":
-        """Flatten the random bodies of a scene; UnknownNameError if they stand on none."""
+        """Flatten the random bodies of a scene.
+
+        Raises UnknownNameError if they stand on none, and ProblemError if that is no upright box.
+        """
         names = [body.name for body in scene.bodies]
         entries, sizes, extents, places = [], [], [], []
         for each in scene.random_bodies:
-            near, surface = ON_BODY, 0
+            near, surface, half = ON_BODY, 0, np.zeros(3)
             if each.near in ("world", "path"):
                 near = IN_WORLD if each.near == "world" else ON_PATH
             elif each.near in names[: len(scene.obstacles)]:
                 surface = names.index(each.near)
+                below = scene.bodies[surface]
+                if below.shape != "box" or below.rotation[2, 2] != 1.0:
+                    told = f"random bodies {each.name!r} stand on {each.near!r}"
+                    raise ProblemError(f"{told}, which is no upright box")
+                half = np.array(below.size) / 2
             else:
                 raise UnknownNameError("obstacle", each.near, names[: len(scene.obstacles)])
             first = names.index(each.slots[0].name) if each.slots else 0
@@ -80,7 +87,7 @@ class SceneDraws(NamedTuple):
             sizes.append([(*unit.size, unit.rounding) for unit in units])
             corners = units[0].corners
             extents.append((corners.min(axis=0), corners.max(axis=0)))
-            places.append(_places(each, near, box_about(scene.bodies[surface])))
+            places.append(_places(each, half))
         return cls(
             entries=np.array(entries, dtype=np.int64).reshape(-1, 6),
             measures=np.array(
@@ -95,11 +102,13 @@ class SceneDraws(NamedTuple):
         )
 
 
-def _places(bodies: RandomBodies, near: int, surface: Array) -> Array:
-    """Range of positions relative to what they are near, shape (2, 3) [m]."""
+def _places(bodies: RandomBodies, half: Array) -> Array:
+    """Range of positions relative to what they are near, shape (2, 3) [m].
+
+    ``half`` is the half-size of the obstacle that they stand on, if any, shape (3,) [m].
+    """
     if bodies.lower is not None:
-        places = np.array([bodies.lower, bodies.upper], dtype=np.float64)
-    else:
-        places = surface.copy() if near == ON_BODY else np.zeros((2, 3))
-        places[:, 2] = 0.0
+        return np.array([bodies.lower, bodies.upper], dtype=np.float64)
+    places = np.array([-half, half])
+    places[:, 2] = 0.0
     return places

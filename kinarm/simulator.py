@@ -97,10 +97,10 @@ class Simulator(EpisodeRunner):
     """Steps batches of rate-limited joint kinematics with contact checks.
 
     An action in [-1, 1] (clipped) moves its joint by at most its velocity limit
-    times the time step, within the limits. A step is tested for contact at
-    evenly spaced configurations up to its end; a move that touches something is
-    refused and ends the episode, as does the tool within the tolerance of the
-    goal. Episodes are truncated at the horizon.
+    times the time step, within the limits. All of the move is tested for
+    contact, or some of its configurations, as the problem says. One that
+    touches something is refused and ends the episode, as does the tool within
+    the tolerance of the goal. Episodes are truncated at the horizon.
 
     Results depend on the inputs alone: not on threads, nor on batches. Arrays
     of a wrong shape, entries that are not finite and starts more than 1e-6
@@ -190,6 +190,11 @@ class Simulator(EpisodeRunner):
         ----------
         rng, count
             As for `kinarm.scenarios.draw_scenarios`.
+
+        Returns
+        -------
+        tuple of ndarray, shape (count, n_joints) and (count, goal_width)
+            Starts [rad or m] and goals [m].
         """
         return draw_scenarios(self.world, rng, count)
 
@@ -225,12 +230,12 @@ class Simulator(EpisodeRunner):
             kept the present one.
         """
         episodes = self.world.episodes(*self.world.check_scenarios(starts, goals), record=record)
-        episodes.steps[:] = taken
-        if done is not None:
-            episodes.pursuit.goals_reached[:] = done[0]
-        self._start(np.arange(len(episodes.steps)), self._stepped(episodes), origins, drive)
-        if done is not None:
-            episodes.pursuit.held[:] = done[1]
+        episodes.steps[:] = self.world.checked_steps(taken)
+        reached, held = (0, None) if done is None else done
+        rows = np.arange(len(episodes.steps))
+        self._start(rows, self._stepped(episodes), origins, drive, reached)
+        if held is not None:
+            episodes.pursuit.held[:] = held
         return episodes
 
     def step(self, episodes: Episodes, actions: ArrayLike) -> StepResult:
@@ -331,7 +336,7 @@ class Simulator(EpisodeRunner):
         q, goal = self.world.check_scenarios(starts, goals)
         table = finite_array("actions", actions, (len(q), self.task.horizon, self.n_actions))
         episodes = self.world.episodes(q, goal, record=record)
-        episodes.steps[:] = taken
+        episodes.steps[:] = self.world.checked_steps(taken)
         session = self.world.session(Control(actions=table), episodes)
         return Rollouts.from_episodes(q, self._run(session))
 

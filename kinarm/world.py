@@ -16,7 +16,7 @@ from kinarm.contact_shapes import PLANE, ContactShapes, unit_boxes
 from kinarm.episode_plants import EpisodePlants
 from kinarm.episode_scenes import drawn_rows
 from kinarm.episodes import Control, Episodes, Rules
-from kinarm.errors import finite_array, one_or_many, whole_number
+from kinarm.errors import InvalidInputError, finite_array, one_or_many, whole_number
 from kinarm.goal_kinematics import GoalKinematics
 from kinarm.kernels.compiling import Array, Stage
 from kinarm.kernels.network import ACT_BY_NETWORKS
@@ -71,7 +71,6 @@ class World(GoalKinematics, StepContact):
         self.threads = whole_number("threads", wanted, 1)
         self.arm = self.problem.load_arm()
         self.contact_model = ContactModel.build(self.arm, self.problem.scene)
-        self.starts = self.checked("task.starts", self.problem.task.starts)
         self._derive()
         self.has_random_bodies = bool(self.problem.scene.random_bodies)
         self._idle: list[tuple[Block, Alone]] = []
@@ -79,6 +78,7 @@ class World(GoalKinematics, StepContact):
     def _derive(self) -> None:
         """Find what kernels have to know of the problem."""
         task, stepping = self.problem.task, self.problem.stepping
+        self.starts = self.checked("task.starts", task.starts)
         self.rules = Rules(
             step_limit=self.arm.velocity_limits[: self.arm.n_actuated] * stepping.time_step,
             tested=stepping.tested_configurations,
@@ -100,7 +100,7 @@ class World(GoalKinematics, StepContact):
 
     def __getstate__(self) -> dict[str, Any]:
         # A copy may get other rules or bodies, and needs its own work space.
-        own = ("records", "layout", "_stages")
+        own = ("records", "layout", "_stages", "goals", "goal_width", "reachable_of_sample")
         kept = {name: value for name, value in self.__dict__.items() if name not in own}
         return kept | {"_idle": []}
 
@@ -172,10 +172,11 @@ class World(GoalKinematics, StepContact):
     def proven(
         self, q: Array, scenes: Array | None = None
     ) -> tuple[Array, NDArray[np.bool_], NDArray[np.bool_], int]:
-        """Tool points of finite configurations [m], and what kernels prove of these.
+        """Tool points of finite configurations, and what kernels prove of these.
 
-        These are: free ones, touching ones, and their number; Coal decides about others. Takes the
-        scenes of `scenes_of`, one for each; without, random bodies are absent.
+        Points have the shape (n, 3) [m]. Then follow which are free, which touch something, shape
+        (n,) each, and how many are one or the other; Coal decides about the rest. Takes the scenes
+        of `scenes_of`, one for each; without, random bodies are absent.
         """
         n, scenes = len(q), self._no_scenes if scenes is None else scenes
         tools, free, touching = np.empty((n, 3)), np.empty(n, dtype=bool), np.empty(n, dtype=bool)
@@ -239,7 +240,7 @@ class World(GoalKinematics, StepContact):
         if not self.has_random_bodies:
             return self
         q = finite_array("start", start, (self.arm.n_joints,))
-        aim = finite_array("goal", goal, (None,))
+        aim = finite_array("goal", goal, (3 if np.size(goal) == 3 else self.goal_width,))
         other, scenes = copy(self), self.scenes_of(q[None], aim[None])
         other.has_random_bodies = False
         other.contact_model = self.contact_model.fixed(scenes[0])
@@ -324,12 +325,20 @@ class World(GoalKinematics, StepContact):
         self._idle.append(space)
         return n_proven
 
+    def checked_steps(self, taken: NDArray[np.int64] | int) -> NDArray[np.int64]:
+        """Numbers of steps taken before, one or of each episode, within the horizon."""
+        steps, horizon = np.asarray(taken), self.rules.horizon
+        whole = steps.dtype.kind in "iu"
+        if not whole or steps.min(initial=0) < 0 or steps.max(initial=0) > horizon:
+            raise InvalidInputError(f"steps taken must be whole numbers in 0..{horizon}")
+        return steps
+
     def _begun_at(self, configurations: ArrayLike, goals: ArrayLike, step: int = 0) -> Episodes:
         """Episodes that begin at configurations, in contact or not."""
         q = finite_array("configurations", configurations, (None, self.arm.n_joints))
         goal = finite_array("goals", goals, (len(q), self.goal_width))
         session = self.session(Control(), self.episodes(q, goal))
-        session.episodes.steps[:] = step
+        session.episodes.steps[:] = self.checked_steps(step)
         if self.has_random_bodies and self.layout.sees_bodies:
             session.episodes.scenes[:] = self.scenes_of(q, goal)
         begin(np.zeros(1, dtype=np.int64), session, np.arange(len(q)))

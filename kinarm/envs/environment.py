@@ -156,13 +156,16 @@ class ArmEnvironment:
             n_joints = self.simulator.arm.n_joints
             width = self.simulator.world.goal_width
             q, goals = np.zeros((self._n_arms, n_joints)), np.zeros((self._n_arms, width))
+            goals[:, 3:4] = 1.0  # directions and quaternions have length 1
         else:
             q, goals = self._episodes.q, self._episodes.goal
         fixed = fixed_scenario(options, self.simulator, self._n_arms)
-        if "start" in fixed:  # refuse those in contact, before anything changes
-            starts, ends = q.copy(), goals.copy()
-            starts[rows], ends[rows] = fixed["start"][rows], fixed.get("goal", goals)[rows]
-            self.simulator.reset(starts, ends)
+        if fixed:  # refuse what cannot be, before anything changes
+            starts, ends = (fixed.get(*each)[rows] for each in (("start", q), ("goal", goals)))
+            if "start" in fixed:
+                self.simulator.reset(starts, ends)
+            else:
+                self.simulator.world.check_scenarios(starts, ends)
         self._queues.put(rows, q, goals)
         for array, name in ((q, "start"), (goals, "goal")):
             if name in fixed:

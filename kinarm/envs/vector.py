@@ -95,7 +95,8 @@ class ReachVectorEnv(ArmEnvironment, VectorEnv[Any, Array, NDArray[Any]]):
         """Begin episodes; see `ReachEnv.reset`.
 
         ``options`` may hold ``reset_mask``, a boolean array, shape (num_envs,), of arms to reset,
-        and ``start`` and ``goal``, shape (num_envs, n_joints) and (num_envs, 3), or one for all.
+        and ``start`` and ``goal``, shape (num_envs, n_joints) and (num_envs,
+        goal_width), or one for all.
         """
         chosen = dict(options or {})
         rows = self._masked_rows(chosen.pop("reset_mask", None))

@@ -24,6 +24,9 @@ LOG_2 = 6.93145751953125e-1
 LOG_2_REST = 1.42860682030941723212e-6
 LOG_2_INVERSE = 1.4426950408889634074
 
+TURN = 6.283185307179586
+"""A whole turn [rad]."""
+
 
 @inlined
 def nearest_whole(x: float) -> float:

@@ -9,15 +9,12 @@ from typing import NamedTuple
 
 from kinarm.chain import Chain
 from kinarm.kernels.compiling import Array, Vector, inlined, lean_kernel
-from kinarm.kernels.elementary import angle_of, sine_cosine
+from kinarm.kernels.elementary import TURN, angle_of, sine_cosine
 from kinarm.kernels.kinematics import forward_kinematics, rotated, to_world
 from kinarm.kernels.lanes import select
 
 POSITION, DIRECTION, POSE, CONFIGURATION = range(4)
 """Kinds of goals."""
-
-TURN = 6.283185307179586
-"""A whole turn [rad]."""
 
 
 class GoalRules(NamedTuple):

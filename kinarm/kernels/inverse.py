@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from kinarm.chain import Chain
 from kinarm.kernels.compiling import Array, Vector, helper, inlined, kernel
-from kinarm.kernels.elementary import nearest_whole
+from kinarm.kernels.elementary import TURN, nearest_whole
 from kinarm.kernels.kinematics import POSE, forward_kinematics, point_jacobian, rotated, to_world
 from kinarm.kernels.lanes import LANES, any_lane, as_lanes, as_numbers, lane_bits, select
 
@@ -33,8 +33,6 @@ HITS = 3
 
 ROUNDING = 1e-9
 """How far a solution beyond a limit is moved to it [rad or m]."""
-
-TURN = 6.28318530717958647693
 
 
 class Search(NamedTuple):

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from kinarm.chain import Chain
 from kinarm.kernels.compiling import Array, Vector, helper, kernel
-from kinarm.kernels.elementary import sine_cosine
+from kinarm.kernels.elementary import TURN, sine_cosine
 from kinarm.kernels.kinematics import POSE, forward_kinematics, to_frame, to_world
 from kinarm.scene_draws import ON_BODY, ON_PATH, SceneDraws
 
@@ -20,8 +20,6 @@ ATTEMPTS = 1000
 
 STEP, FIRST, SECOND = 0x9E3779B97F4A7C15, 0xBF58476D1CE4E5B9, 0x94D049BB133111EB
 """Constants of the generator."""
-
-TWO_PI = 6.283185307179586
 
 
 @helper
@@ -52,7 +50,7 @@ def turn_row(turn: int, state: NDArray[np.uint64], row: Array) -> None:
     """Fill in the rotation matrix of a row: not turned, by a yaw, or anyhow."""
     w, x, y, z = 1.0, 0.0, 0.0, 0.0
     if turn == 1:
-        z, w = sine_cosine(0.5 * TWO_PI * (uniform(state) - 0.5))
+        z, w = sine_cosine(0.5 * TURN * (uniform(state) - 0.5))
     elif turn == 2:
         norm = 2.0
         # Uniform in a ball of four dimensions, so in all directions.

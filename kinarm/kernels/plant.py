@@ -12,12 +12,11 @@ from numpy.typing import NDArray
 from kinarm.chain import Chain
 from kinarm.episodes import Episodes, Rules
 from kinarm.kernels.compiling import Array, inlined, kernel
-from kinarm.kernels.elementary import exponential, nearest_whole, sine_cosine
+from kinarm.kernels.elementary import TURN, exponential, nearest_whole, sine_cosine
 from kinarm.kernels.kinematics import forward_kinematics
 from kinarm.kernels.lanes import any_lane, as_numbers, select
 from kinarm.kernels.placing import STEP, mixed, seed_state, uniform
 from kinarm.kernels.work_space import Block
-from kinarm.plant import PlantDraws
 
 SEED = 0xBF58476D1CE4E5B9
 """Begins the random numbers of plants, which are not those of scenes."""
@@ -44,33 +43,37 @@ def plant_width(n_actuated: int) -> int:
 
 @kernel
 def draw_plants(
-    first: int, last: int, draws: PlantDraws, bits: NDArray[np.uint64], plants: Array
+    first: int, last: int, ranges: Array, part: float, bits: NDArray[np.uint64], plants: Array
 ) -> None:
     """Draw the plants of some episodes.
 
     Parameters
     ----------
-    first, last, draws
-        Range of the rows, and how plants are drawn.
-    bits : ndarray, shape (n, 3 + n_joints)
+    first, last
+        Range of the rows.
+    ranges : ndarray, shape (n_ranges, 2)
+        Lower and upper ends of `kinarm.plant.RANGES`.
+    part : float
+        Duration of a part of a step [s].
+    bits : ndarray, shape (n, goal_width + n_joints)
         Bits of goals and starts.
     plants : ndarray, shape (n, plant_width(n_actuated))
         Where plants go.
     """
-    state, drawn = np.empty(1, dtype=np.uint64), np.empty(draws.ranges.shape[0])
-    part, n_actuated = draws.time_step / SUBSTEPS, draws.step_limit.shape[0]
+    state, drawn = np.empty(1, dtype=np.uint64), np.empty(ranges.shape[0])
+    n_actuated = (plants.shape[1] - OFFSETS - 3) // 2
     for e in range(first, last):
         plant = plants[e]
         seed_state(state, SEED, bits, e)
         plant[HIGH_BITS] = float(state[0] >> np.uint64(32))
         plant[LOW_BITS] = float(state[0] & np.uint64(0xFFFFFFFF))
         for i in range(drawn.shape[0]):
-            lower, upper = draws.ranges[i, 0], draws.ranges[i, 1]
+            lower, upper = ranges[i, 0], ranges[i, 1]
             drawn[i] = lower + uniform(state) * (upper - lower)
             if i == 3:
                 uniform(state)  # once drew another limit: plants are those of recorded figures
         # As likely for each number of steps.
-        lower, upper = draws.ranges[0, 0], draws.ranges[0, 1]
+        lower, upper = ranges[0, 0], ranges[0, 1]
         plant[DELAY] = lower + math.floor(uniform(state) * (upper - lower + 1.0))
         bandwidth, damping, acceleration = drawn[1], drawn[2], drawn[3]
         plant[RESOLUTION], plant[NOISE], plant[GOAL_NOISE] = drawn[4], drawn[5], drawn[8]
@@ -89,7 +92,7 @@ def draw_plants(
 @inlined
 def fill_servo(plant: Array, bandwidth: float, damping: float, part: float) -> None:
     """Fill in how a servo's error and velocity follow from those a part of a step before."""
-    rate = 6.283185307179586 * bandwidth
+    rate = TURN * bandwidth
     decay = rate * damping
     if bandwidth == 0.0 or decay * part > 500.0:
         plant[SERVO], plant[SERVO + 1] = 0.0, 0.0
@@ -118,7 +121,7 @@ def fill_calm(plant: Array, bandwidth: float, damping: float, part: float) -> No
     their velocity by at most |v| + rate |e|.
     """
     servo = bandwidth > 0.0 and plant[SERVO] != 0.0
-    plant[RATE] = 6.283185307179586 * bandwidth if servo else 1.0 / part
+    plant[RATE] = TURN * bandwidth if servo else 1.0 / part
     gain = plant[RATE] * part * (1.0 + 2.0 * damping) if servo else 2.0
     plant[STEADY] = plant[MOST_CHANGE] / gain
 

@@ -24,7 +24,7 @@ from kinarm.kernels.shield import REFUSED, take_down, unsafe_stops
 
 
 @lean_kernel
-def begin(counters: NDArray[np.int64], session: Session, rows: NDArray[np.int64]) -> int:
+def begin(counter: NDArray[np.int64], session: Session, rows: NDArray[np.int64]) -> int:
     """Start episodes at their ``q``, ``goal`` and ``steps``; ``rows``, shape (n,), tells which.
 
     Returns how many pause, as not proven free. Threads may share them as in `advance`.
@@ -34,7 +34,7 @@ def begin(counters: NDArray[np.int64], session: Session, rows: NDArray[np.int64]
     q, path = episodes.q, episodes.path
     distances, n_paused = as_numbers(block.distance), 0
     while True:
-        start = LANES * take_number(counters, 0)
+        start = LANES * take_number(counter)
         if start >= rows.shape[0]:
             return n_paused
         filled = min(rows.shape[0] - start, LANES)
@@ -98,7 +98,7 @@ def begin(counters: NDArray[np.int64], session: Session, rows: NDArray[np.int64]
 
 
 @lean_kernel
-def advance(counters: NDArray[np.int64], session: Session) -> int:
+def advance(counter: NDArray[np.int64], session: Session) -> int:
     """Advance the running episodes, a block at a time; return how many paused.
 
     Each goes on until it ends, reaches its ``stop`` or pauses before a step that is proven neither
@@ -120,7 +120,7 @@ def advance(counters: NDArray[np.int64], session: Session) -> int:
         # Fill the lanes that are empty.
         for lane in range(row.shape[0]):
             if row[lane] < 0 and waiting < n_episodes:
-                waiting = next_waiting(counters, episodes)
+                waiting = next_waiting(counter, episodes)
                 if waiting < n_episodes:
                     row[lane] = waiting
                     load_episode(waiting, lane, shapes, rules, control, episodes, block)
@@ -229,10 +229,10 @@ def advance(counters: NDArray[np.int64], session: Session) -> int:
 
 
 @inlined
-def next_waiting(counters: NDArray[np.int64], episodes: Episodes) -> int:
+def next_waiting(counter: NDArray[np.int64], episodes: Episodes) -> int:
     """Next episode to be advanced; past the last one if there is none."""
     while True:
-        e = take_number(counters, 0)
+        e = take_number(counter)
         if e >= episodes.status.shape[0]:
             return e
         if episodes.status[e] == RUNNING and episodes.steps[e] < episodes.stop[e]:

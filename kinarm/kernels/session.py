@@ -190,7 +190,7 @@ class Session(Record):
         collected = 0 if shift is None else len(starts)
         if (
             episodes.q.shape != starts.shape
-            or self.control.side != control.side
+            or (self.control.side, self.control.rates) != (control.side, control.rates)
             or len(episodes.moments) != collected
             or any(own.shape != other.shape for own, other in parts)
         ):
@@ -205,8 +205,8 @@ class Session(Record):
 
 
 @instruction
-def take_number(_: Any, counters: types.Array, place: types.Integer) -> Any:
-    """Raise a counter, of an array of int64, by one; return its former value.
+def take_number(_: Any, counter: types.Array) -> Any:
+    """Raise a counter, an array of one int64, by one; return its former value.
 
     Threads get different numbers.
     """
@@ -214,9 +214,8 @@ def take_number(_: Any, counters: types.Array, place: types.Integer) -> Any:
     def code(context: Any, builder: Any, _signature: Any, arguments: Any) -> Any:
         from numba.np.arrayobj import make_array
 
-        array = make_array(counters)(context, builder, arguments[0])
-        index = context.cast(builder, arguments[1], place, types.intp)
+        array = make_array(counter)(context, builder, arguments[0])
         one = ir.Constant(ir.IntType(64), 1)
-        return builder.atomic_rmw("add", builder.gep(array.data, [index]), one, "monotonic")
+        return builder.atomic_rmw("add", array.data, one, "monotonic")
 
-    return types.int64(counters, place), code
+    return types.int64(counter), code

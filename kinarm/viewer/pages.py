@@ -65,7 +65,7 @@ def contact_data(model: ContactModel) -> dict[str, Any]:
     return {
         "bodies": bodies,
         "pairs": [[pair.first, pair.second] for pair in model.geometry.collisionPairs],
-        "travel": model.shapes.travel.tolist(),
+        "travel": model.shapes.travel[: model.arm.n_actuated].tolist(),
     }
 
 

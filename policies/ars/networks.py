@@ -10,7 +10,7 @@ import numpy as np
 
 from kinarm.errors import InvalidInputError
 from kinarm.kernels.compiling import Array, inlined, kernel
-from kinarm.kernels.elementary import LOG_2, LOG_2_REST, sine_cosine
+from kinarm.kernels.elementary import LOG_2, LOG_2_REST, TURN, sine_cosine
 from kinarm.kernels.lanes import LANES, as_lanes, power_of_two, select
 from kinarm.networks import Layer, Networks, split_parameters
 from kinarm.observation_layout import ObservationLayout
@@ -103,9 +103,6 @@ def parameters_of(policy: Policy) -> Array:
     if bias.any():
         raise InvalidInputError("initial_policy has a bias, which linear policies of ARS have not")
     return np.array(weights)
-
-
-TURN = 6.283185307179586
 
 
 @inlined

@@ -8,8 +8,8 @@ from numpy.typing import NDArray
 from kinarm.bodies import rotation_of_quaternion
 from kinarm.kernels.arriving import put_goal
 from kinarm.kernels.compiling import Array, Vector, kernel
+from kinarm.kernels.elementary import TURN
 from kinarm.kernels.goals import CONFIGURATION, DIRECTION, POSE, GoalRules, circle_points
-from kinarm.kernels.goals import TURN as WHOLE_TURN
 from kinarm.kernels.lanes import LANES, as_lanes, as_numbers
 from kinarm.kernels.records import recorded
 from kinarm.policies.oracle.kernels.rotation import Turn
@@ -76,7 +76,7 @@ class Aims(NamedTuple):
             # The last joint does not turn the tool's axis if it is its own.
             turning[-1] &= np.abs(np.cross(chain.axis[-1], axes[0])).max() > PARALLEL
         chord, _ = np.empty((2, 1))
-        circle_points(np.array([min(goal.tolerance / (2 * WHOLE_TURN), 0.25)]), _, chord)
+        circle_points(np.array([min(goal.tolerance / (2 * TURN), 0.25)]), _, chord)
         weight = float(rules.tolerance / (2.0 * chord[0])) if len(axes) else 0.0
         turn = Turn(axes, axes, weight, np.where(turning, weight, 0.0))
         return cls(goals[:, :3].copy(), wanted, lower, upper, turn)

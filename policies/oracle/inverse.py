@@ -118,21 +118,10 @@ def step_box(simulator: Simulator, starts: Array, steps: NDArray[np.int64]) -> t
 
 
 def steps_between(simulator: Simulator, first: Array, second: Array) -> Array:
-    """Steps of the straight motion between configurations, before rounding up.
+    """Steps of straight motions between configurations, shape (...), before rounding up.
 
-    The slowest joint decides: the largest of |dq_i| / (rate_i dt) over the
-    actuated joints.
-
-    Parameters
-    ----------
-    simulator : Simulator
-        The arm and its step.
-    first, second : ndarray, shape (..., n_joints)
-        The configurations [rad or m].
-
-    Returns
-    -------
-    ndarray, shape (...)
+    The slowest actuated joint decides: the largest of |dq_i| / (rate_i dt). Configurations have the
+    shape (..., n_joints) [rad or m].
     """
     moved = np.abs(second - first)[..., : simulator.n_actions] / simulator.step_limit
     steps: Array = moved.max(axis=-1)

@@ -61,10 +61,7 @@ class Motions:
         self._longest = LANES * np.sqrt(8.0 * BEND / max(float(bend), 1e-9))
 
     def durations(self, first: Array, second: Array) -> Array:
-        """How long motions take at the velocity limits, shape (...) [s].
-
-        Takes their ends, shape (..., n_joints) [rad or m].
-        """
+        """How long motions between ends, shape (..., n_joints), take at full speed, (...) [s]."""
         moved = np.abs(second - first)[..., : self.moved] / self.speeds
         durations: Array = moved.max(axis=-1)
         return durations

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kinarm._fields import Checked
-from kinarm.errors import FROM_ZERO, NOT_NEGATIVE, POSITIVE, InvalidInputError
+from kinarm.errors import FROM_ZERO, NOT_NEGATIVE, POSITIVE, POSITIVE_SHARE, InvalidInputError
 
 Array = NDArray[np.float64]
 
@@ -17,8 +17,6 @@ TO_FULL_SPEED, TO_FULL_ACCELERATION = 0.5, 0.1
 Kind = Literal["configuration", "position", "direction", "pose"]
 PARTS = {"position": 3, "direction": 6, "pose": 6}
 """Numbers of starts and goals that are no configurations."""
-
-SHARE = {"must": "lie in (0, 1]", "holds": lambda value: 0 < value <= 1}
 
 
 class Limits(NamedTuple):
@@ -58,7 +56,7 @@ class PlanSettings(Checked):
     start_kind: Kind = "configuration"
     goal_kind: Kind = "configuration"
     margin: float = field(default=0.0, metadata=NOT_NEGATIVE)
-    speed: float = field(default=1.0, metadata=SHARE)
+    speed: float = field(default=1.0, metadata=POSITIVE_SHARE)
     acceleration: tuple[float, ...] = field(default=(), metadata=POSITIVE)
     jerk: tuple[float, ...] = field(default=(), metadata=POSITIVE)
     samples: int = field(default=20_000, metadata=FROM_ZERO)

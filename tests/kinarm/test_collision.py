@@ -122,7 +122,7 @@ class TestTravel:
             if kind == WITH_HALFSPACE:
                 change = change[..., 2:]
             motion = np.linalg.norm(change, axis=2).max(axis=1)
-            bound = turn @ shapes.travel[:, column]
+            bound = turn @ shapes.travel[: turn.shape[1], column]
             assert (motion <= bound + 1e-12).all()
             tightest = max(tightest, (motion / np.fmax(bound, 1e-9)).max())
         assert tightest > 0.9

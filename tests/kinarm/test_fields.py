@@ -136,6 +136,8 @@ class TestFromPlain:
             ({"picture": 1}, "picture must be a path, got 1"),
             ({"wheels": [{"spokes": 3}]}, r"'wheels\[0\].radius' is missing: From the hub to"),
             ({"spare": {"radius": 0}}, "spare: radius must be above 0 m, got 0"),
+            ({"spare": {"radius": 10**400}}, r"spare.radius must be a number \[m\], got 1000"),
+            ({"wheels": [None]}, r"wheels\[0\] must be a table, got None"),
         ],
     )
     def test_one_line_names_source_key_and_what_is_expected(self, changes, message):

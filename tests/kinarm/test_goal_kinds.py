@@ -94,6 +94,14 @@ def test_the_reference_agrees_with_a_plant(kind):
     compare_with_reference(simulator_of({**KINDS[kind], "sequence": 2}, **settings))
 
 
+def test_goals_reached_before_count():
+    simulator = simulator_of({"kind": "direction", "sequence": 3})
+    scenarios = simulator.sample(np.random.default_rng(1), 2)
+    episodes = simulator.reset(*scenarios, done=np.array([[1, 2], [0, 0]]))
+    np.testing.assert_array_equal(episodes.pursuit.goals_reached, [1, 2])
+    np.testing.assert_array_equal(episodes.goal, episodes.pursuit.goals[[0, 1], [1, 2]])
+
+
 def compare_with_reference(simulator):
     starts, goals = simulator.sample(np.random.default_rng(1), N)
     actions = actions_to(simulator, starts, goals)

@@ -7,12 +7,13 @@ from mesh_files import CUBE_CORNERS, write_stl
 from random_scenes import random_body
 from reference_episodes import compare_actions
 
-from kinarm import Arm, ReachProblem, Simulator
+from kinarm import Arm, ReachProblem, Simulator, World
 from kinarm.arm_specification import AllowedContact, ArmSpecification
 from kinarm.bodies import SHAPES, HeldBody
 from kinarm.contact_pairs import TOUCH_AT_HOME
 from kinarm.contact_statistics import contact_on_bare_ground
 from kinarm.errors import KinarmError
+from kinarm.recording import record_path
 from kinarm.viewer.visual_shapes import arm_parts
 
 HELD = [shape for shape in SHAPES if shape != "halfspace"]
@@ -77,6 +78,22 @@ def test_episodes_are_those_of_the_reference(shape):
     simulator = Simulator(ReachProblem.load("both").replace(arm=specification), threads=1)
     _, collisions, count = compare_actions(simulator, 8, 40)
     assert 0.1 * count < collisions < count
+
+
+def test_joints_that_are_not_actuated_move_it_into_contact():
+    """The last joint of the arm, by which a box beside its axis meets the bench."""
+    arm = ArmSpecification(held_bodies=(held("box", size=(0.05, 0.05, 0.4)),))
+    world = World(ReachProblem.load("both").replace(arm=arm), threads=1)
+    rng, met = np.random.default_rng(3), 0
+    for q in rng.uniform(world.arm.lower, world.arm.upper, (1000, 6)):
+        ends = np.tile(q, (2, 1))
+        ends[:, 5] = 0.0, 1.0
+        met_at_end = world.in_contact(ends)
+        if met_at_end.tolist() == [False, True]:
+            met += 1
+            assert world.contact(*ends) is not None
+            assert record_path(world, ends).outcome == "collision"
+    assert met > 3
 
 
 def test_problems_keep_it(tmp_path):

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from kinarm.errors import InvalidInputError
-from kinarm.networks import CompiledPolicy, Layer, Networks, split_parameters
+from kinarm.networks import CompiledPolicy, Layer, Mirror, Networks, split_parameters
 
 
 class Offering:
@@ -54,6 +54,22 @@ def test_a_policy_offers_its_networks_and_others_are_refused():
 def test_layers_have_to_fit(layers, message):
     with pytest.raises(InvalidInputError, match=message):
         Networks(tuple(layers))
+
+
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        ({"rates": 2}, "rates must be the first of 2 observations"),
+        ({"rates": -2}, "rates must be"),
+        ({"mirror": Mirror(np.ones(4), np.ones(2))}, "mirror of observations must have shape"),
+        ({"mirror": Mirror(np.ones(3), np.ones(3))}, "mirror of actions must have shape"),
+        ({"mirror": Mirror(np.ones(3), np.ones(2), side=3)}, "side of the mirror .* at most 2"),
+    ],
+)
+def test_what_kernels_read_has_to_be_there(given, message):
+    layer = Layer(np.zeros((1, 2, 3)), np.zeros((1, 2)))
+    with pytest.raises(InvalidInputError, match=message):
+        Networks((layer,), **given)
 
 
 def test_every_layer_needs_a_function_that_there_is():

@@ -6,7 +6,7 @@ import pytest
 
 from kinarm.arm import Arm, ArmSpecification
 from kinarm.errors import ArmError, ProblemError, UnknownNameError
-from kinarm.problem import PROBLEMS
+from kinarm.problem import PROBLEMS, ReachProblem
 from kinarm.problem_options import ProblemOptions, say_choices
 from kinarm.scene import Scene
 from kinarm.simulator import Simulator
@@ -24,6 +24,12 @@ class TestReplace:
         assert RIGHT.replace(scene="left").scene == Scene()
         changed = RIGHT.replace(stepping=Stepping(time_step=0.1), tested_configurations=2)
         assert changed.stepping == Stepping(time_step=0.1, tested_configurations=2)
+
+    def test_changes_are_told_also_if_they_lead_to_defaults(self):
+        assert PROBLEMS["both"].changes == []
+        assert PROBLEMS["both"].replace(tolerance=0.03).changes == ["task.tolerance = 0.03"]
+        ideal = ReachProblem.load("hard-paper").replace(plant="ideal").changes
+        assert {"plant.delay = 0", "plant.noise = 0.0"} <= set(ideal)
 
     def test_arm_as_name_path_specification_or_arm(self, shipped_arms):
         flange = shipped_arms["paper_flange"]

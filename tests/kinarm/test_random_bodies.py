@@ -7,17 +7,26 @@ from configurations import random_configurations
 from numba import njit
 from reference_episodes import compare_actions
 
-from kinarm.bodies import RandomBodies
+from kinarm.bodies import Body, RandomBodies
 from kinarm.episode_scenes import scene_of_episode
 from kinarm.errors import KinarmError
 from kinarm.kernels.placing import uniform
-from kinarm.meshes import box_about
+from kinarm.meshes import coal_shape
 from kinarm.policies import Oracle
 from kinarm.problem import PROBLEMS
 from kinarm.recording import record_rollouts
 from kinarm.scene import PAPER_BENCHES, Mount, Scene
+from kinarm.scene_draws import SceneDraws
 from kinarm.simulator import Simulator
 from kinarm.viewer import replay_page
+
+
+def box_about(body):
+    """Lower and upper corner of a box about a body, in its own frame, shape (2, 3) [m]."""
+    shape = coal_shape(body)
+    shape.computeLocalAABB()
+    return np.array([shape.aabb_local.min_, shape.aabb_local.max_])
+
 
 RANGE = {"lower": (-0.5, -0.5, 0.1), "upper": (0.5, 0.5, 0.7)}
 
@@ -232,6 +241,18 @@ def test_goals_that_nothing_reaches_are_refused(monkeypatch):
     far = PROBLEMS["both"].replace(reachable_goals=True, scene=scene)
     with pytest.raises(KinarmError, match="nothing free of contact is found at the goal"):
         Simulator(far).sample(np.random.default_rng(0), 10)
+
+
+@pytest.mark.parametrize(
+    ("shape", "size", "rpy"),
+    [("sphere", (0.2,), (0, 0, 0)), ("box", (1, 1, 1), (0.1, 0, 0)), ("box", (1, 1, 1), (3, 0, 0))],
+)
+def test_they_stand_on_upright_boxes_alone(shape, size, rpy):
+    below = Body(name="below", shape=shape, size=size, rpy=rpy)
+    its = {"smallest": (0.1,), "largest": (0.1,), "near": "below"}
+    standing = RandomBodies(name="it", shape="sphere", **its)
+    with pytest.raises(KinarmError, match="'it' stand on 'below', which is no upright box"):
+        SceneDraws.of(Scene(obstacles=(below,), random_bodies=(standing,)))
 
 
 @pytest.mark.parametrize(

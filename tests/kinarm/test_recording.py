@@ -96,6 +96,7 @@ def test_they_survive_a_file(recordings, tmp_path):
     desk = Obstacle(name="desk", lower=(0, -1, 0), upper=(1, 1, 0.4))
     scene = Scene(obstacles=(desk,), ground=False)
     recording = elsewhere(recordings[0], scene=scene, tolerance=0.03, time_step=0.01)
+    recording = replace(recording, trial=np.int64(recording.trial))
     save_recordings(tmp_path / "made.npz", [recording, *recordings])
     loaded = load_recordings(tmp_path / "made.npz")
     assert all(same(a, b) for a, b in zip([recording, *recordings], loaded, strict=True))

@@ -49,6 +49,7 @@ def test_size_and_centre():
         (obstacle, {"upper": (1.0, 1.0, 2e6)}, r"upper must be at most 1e\+06, got 2"),
         (region, {"upper": (0, -1, 0.9)}, "goal region 'top' is empty.*along two axes at least"),
         (Scene, {"obstacles": 2 * (obstacle(),)}, "two obstacles are called 'table'"),
+        (Scene, {"obstacles": (obstacle(name="ground"),)}, "two obstacles are called 'ground'"),
         (Scene, {"obstacles": 1001 * (obstacle(),)}, "1001 obstacles: at most 1000"),
         (Scene, {"cube_edge": -0.01}, "cube_edge"),
     ],

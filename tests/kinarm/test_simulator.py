@@ -123,7 +123,7 @@ class TestAgreement:
         assert rollouts.collision.any()
         for i in range(60):
             visited = rollouts.paths[i, : rollouts.steps[i]]
-            seen = np.array([reference.observe(q, goals[i])[0] for q in visited]) - shift
+            seen = np.array([reference.observe(q, goals[i]) for q in visited]) - shift
             np.testing.assert_allclose(rollouts.moments[i, 0], seen.sum(axis=0), atol=1e-10)
             np.testing.assert_allclose(rollouts.moments[i, 1], (seen**2).sum(axis=0), atol=1e-10)
 
@@ -316,6 +316,14 @@ class TestBatchesThatServeAgain:
                 expected.append(new.rollout(networks, *scenarios, shift=shift))
         for first, second in zip(found, expected, strict=True):
             assert_identical(first, second)
+
+    def test_networks_that_add_to_inverse_kinematics_are_no_others(self, scenarios):
+        problem = ReachProblem.load("both").replace(observation=["goal", "resolved_rate"])
+        simulator = Simulator(problem, threads=1)
+        still = Networks((Layer(np.zeros((1, 5, 8)), np.zeros((1, 5))),))
+        assert not simulator.rollout(still, *scenarios).success.any()
+        adding = replace(still, rates=3)
+        assert simulator.rollout(adding, *scenarios).success.mean() > 0.2
 
     def test_threads_may_use_one_simulator(self, simulator, scenarios):
         batches = [linear_policies(simulator, 1, seed) for seed in range(8)]

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from configurations import contact_boundary, random_configurations, substeps
 
-from kinarm.errors import InvalidInputError, UnknownNameError
+from kinarm.errors import InvalidInputError, ProblemError, UnknownNameError
 from kinarm.problem import ReachProblem
 from kinarm.scene import Obstacle, Scene
 from kinarm.world import World
@@ -47,6 +47,7 @@ def test_threads_do_not_matter(simulator):
         ("observe", (np.zeros((2, 5)), np.zeros((2, 3))), r"must have shape \(n, 6\)"),
         ("distances", (np.zeros((2, 6)), np.zeros((1, 3))), r"goals must have shape \(2, 3\)"),
         ("contact_pair", (np.full(6, np.nan), np.zeros(6)), "configuration must be finite"),
+        ("observe", (np.zeros((2, 6)), np.zeros((2, 3)), 65), r"steps taken .* in 0\.\.64"),
     ],
 )
 def test_bad_input(simulator, asked, given, message):
@@ -59,6 +60,16 @@ def test_what_is_observed_is_the_beginning_of_an_episode(simulator):
     episodes = simulator.reset(starts, goals)
     np.testing.assert_array_equal(simulator.world.observe(starts, goals), episodes.observation)
     np.testing.assert_array_equal(simulator.world.distances(starts, goals), episodes.distance)
+
+
+def test_changed_worlds_are_as_if_built_so(simulator):
+    world = World(simulator.problem, threads=1)
+    assert world.goals.lower[:, 1].min() < 0.0
+    left = world.changed(goal_regions=("left",))
+    assert left.goals.lower[:, 1].min() > 0.0
+    assert world.changed(goal={"kind": "pose"}).goal_width == 7
+    with pytest.raises(ProblemError, match=r"task.starts\[0\] is in contact"):
+        world.changed(starts=[np.deg2rad([0, 110, -60, 0, 0, 0]).tolist()])
 
 
 class TestContact:

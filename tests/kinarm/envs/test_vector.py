@@ -9,9 +9,11 @@ import pinocchio as pin
 import pytest
 from gymnasium.vector import AutoresetMode, SyncVectorEnv
 
+from kinarm.bodies import RandomBodies
 from kinarm.envs.reach import ReachEnv
 from kinarm.envs.vector import ReachVectorEnv
 from kinarm.errors import InvalidInputError, StartInContactError
+from kinarm.scene import Scene
 
 NAME = "kinarm/ReachBoth-v0"
 NUMBER = 7
@@ -213,6 +215,27 @@ class TestOptions:
     def test_bad_options(self, options, message):
         with pytest.raises(InvalidInputError, match=message):
             native("SameStep").reset(options=options)
+
+    def test_goals_are_checked_at_every_reset(self):
+        batch = native("Disabled")
+        batch.reset(seed=0)
+        with pytest.raises(InvalidInputError, match="goals must lie within"):
+            batch.reset(options={"goal": [1e12, 0.0, 0.0]})
+
+    def test_arms_that_are_not_begun_are_not_asked(self):
+        """Their bodies stay, wherever the arms are by now."""
+        bodies = {"name": "ball", "shape": "sphere", "smallest": (0.1,), "largest": (0.3,)}
+        places = {"lower": (-1.0, -1.0, 0.0), "upper": (1.0, 1.0, 1.2), "count": (3, 5)}
+        scene = Scene(random_bodies=(RandomBodies(**bodies, **places),))
+        batch = ReachVectorEnv(16, "both", scene=scene, shield=True, autoreset_mode="Disabled")
+        batch.reset(seed=0)
+        for _ in range(6):
+            batch.step(np.random.default_rng(0).uniform(-1, 1, (16, 5)))
+        starts, goals = batch.simulator.sample(np.random.default_rng(1), 16)
+        mask, before = np.arange(16) == 0, batch.configuration
+        batch.reset(options={"start": starts, "goal": goals, "reset_mask": mask})
+        np.testing.assert_array_equal(batch.configuration[0], starts[0])
+        np.testing.assert_array_equal(batch.configuration[1:], before[1:])
 
     def test_failed_reset_leaves_no_half_begun_episodes(self):
         batch, untouched = native("SameStep"), native("SameStep")

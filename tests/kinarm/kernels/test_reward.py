@@ -5,6 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from numba import njit
+from reference_episodes import scripted
 from simulators import changed
 
 from kinarm.kernels import reward
@@ -83,12 +84,12 @@ def test_each_term_alone_equals_the_reference(simulator, term):
     weights = dict.fromkeys(REWARD_TERMS, 0) | {term: -0.5 if term == "collision" else 0.5}
     single = changed(simulator, reward=weights, tolerance=0.3)
     rng = np.random.default_rng(1)
-    starts, goals = single.sample(rng, 60)
-    actions = np.repeat(rng.uniform(-1, 1, (60, 8, 5)), 8, axis=1)
+    starts, goals = single.sample(rng, 40)
+    actions = np.repeat(rng.uniform(-1, 1, (40, 8, 5)), 8, axis=1)
     rollouts = single.rollout_actions(actions, starts, goals)
     reference = ReferenceSimulator(single)
-    for i in range(60):
-        rows = iter(actions[i])
-        episode = reference.rollout(lambda _, rows=rows: next(rows), starts[i], goals[i])
+    for i in range(40):
+        acts, scenario = scripted(actions[i]), (starts[i], goals[i])
+        episode = reference.rollout(acts, *scenario, observed=False)
         assert rollouts.returns[i] == pytest.approx(episode.rewards.sum(), abs=1e-10)
     assert (rollouts.returns != 0).sum() > 2

@@ -29,7 +29,7 @@ def world():
 @pytest.fixture(scope="module")
 def ways(world):
     """Ends of random motions, short and long, that begin without contact; shape (n, 2, 6)."""
-    rng, arm, n = np.random.default_rng(3), world.arm, 160
+    rng, arm, n = np.random.default_rng(3), world.arm, 100
     first = rng.uniform(arm.lower, arm.upper, (n, 6))
     second = np.clip(
         first + 10.0 ** rng.uniform(-2, 0.3, (n, 1)) * rng.normal(size=(n, 6)), arm.lower, arm.upper
@@ -58,7 +58,7 @@ def test_free_shares_keep_the_margin_and_no_more(world, ways, margin):
             rest = way[0] + np.linspace(share, end, 300)[:, None] * (way[1] - way[0])
             assert pair_distances(world, rest).min() < margin + 2e-3
             blocked += 1
-    assert blocked > 10
+    assert blocked > 5
 
 
 def test_without_coal_what_is_not_proven_counts_as_contact(world, ways):
