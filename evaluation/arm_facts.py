@@ -11,13 +11,18 @@ from numpy.typing import NDArray
 from kinarm.arm import Arm
 from kinarm.arm_specification import MOST_PIECES, ArmFile
 from kinarm.collision import ContactModel
-from kinarm.contact_pairs import TOUCH_AT_HOME, are_neighbours, link_of, make_verdicts_reliable
+from kinarm.contact_pairs import (
+    TOUCH_AT_HOME,
+    are_neighbours,
+    link_of,
+    make_verdicts_reliable,
+    random_configurations,
+)
 from kinarm.contact_statistics import (
     SAMPLES,
     ContactStatistics,
     arm_warnings,
     contact_on_bare_ground,
-    random_configurations,
 )
 from kinarm.evaluation.report.templating import template_environment
 
@@ -83,7 +88,7 @@ FIRST_PIECES = 4
 
 
 class SelfContact:
-    """Which random configurations touch, with hulls and with meshes; see `random_configurations`.
+    """Which random configurations touch, with hulls and with meshes; see `kinarm.contact_pairs`.
 
     Links are tested that are tested in simulations, but those of which shapes touch at home. A mesh
     is a surface: nothing touches it from inside. Verdicts, shape (n,), are with the arm's shapes,
@@ -91,7 +96,7 @@ class SelfContact:
     """
 
     def __init__(self, contact: ContactModel, count: int = SAMPLES) -> None:
-        self._arm, self._configurations = contact.arm, random_configurations(contact, count)
+        self._arm, self._configurations = contact.arm, random_configurations(contact.arm, count)
         shapes = list(contact.arm.geometry.geometryObjects)
         links = dict(zip(contact.body_names, map(link_of, shapes), strict=False))
         resting = [pair for pair, why in contact.left_out.items() if why == TOUCH_AT_HOME]

@@ -255,8 +255,11 @@ def _run_random(trials: TrialSet, *, record: bool = False) -> Rollouts:
     return simulator.rollout_actions(actions, trials.starts, trials.goals, record=record)
 
 
-def _run_oracle(trials: TrialSet, *, record: bool = False) -> Rollouts:
-    actions, ideal = oracle_bounds(trials).actions, trials.simulator.with_plant(Plant())
+def _run_oracle(
+    trials: TrialSet, *, record: bool = False, aimed: TrialSet | None = None
+) -> Rollouts:
+    """The oracle's motions, perhaps those that it found for nearer goals."""
+    actions, ideal = oracle_bounds(aimed or trials).actions, trials.simulator.with_plant(Plant())
     return ideal.rollout_actions(actions, trials.starts, trials.goals, record=record)
 
 
@@ -277,10 +280,7 @@ def measure_holding(contestant: Contestant, trials: TrialSet) -> Holding:
     endless = trials.with_tolerance(NEVER)
     if contestant is ORACLE:
         aimed = trials.with_tolerance(min(AIM, trials.problem.task.tolerance))
-        actions = oracle_bounds(aimed).actions
-        scenarios = (endless.starts, endless.goals)
-        ideal = endless.simulator.with_plant(Plant())
-        rollouts = ideal.rollout_actions(actions, *scenarios, record=True)
+        rollouts = _run_oracle(endless, record=True, aimed=aimed)
     else:
         rollouts = contestant.run(endless, record=True)
     return Holding.of(rollouts, trials)

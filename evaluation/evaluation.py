@@ -136,10 +136,11 @@ class Evaluation:
 
 def outcomes_of(members: Sequence[Evaluation]) -> Outcomes:
     """Outcomes of one or several training seeds in the same trials."""
+    holding = tuple(member.holding for member in members if member.holding)
     return Outcomes(
         tuple(member.rollouts for member in members),
         members[0].bounds,
-        tuple(member.holding for member in members if member.holding),
+        holding if len(holding) == len(members) else (),
         members[0].problem.stepping.time_step,
     )
 

@@ -2,7 +2,6 @@
 
 import inspect
 import re
-import sys
 from collections.abc import Iterable
 from importlib import import_module
 from pathlib import Path
@@ -15,6 +14,7 @@ from kinarm.evaluation.predictors import Actor, Wrapper
 from kinarm.networks import PolicyFunction
 from kinarm.policies.conversion.models import saved_model
 from kinarm.policies.conversion.sb3 import native_statistics
+from kinarm.policies.learners import look_here
 from kinarm.policies.library import models_in, policy_files
 from kinarm.policies.policy import Policy
 from kinarm.policies.provenance import normalization_remark
@@ -50,6 +50,11 @@ def find_contestants(
         ``"module:function"``: policies face the trials in it. It gets a
         `kinarm.ReachEnv`; or, if its argument is called ``venv``, a ``VecEnv``
         of Stable-Baselines3.
+
+    Raises
+    ------
+    KinarmError
+        If there is none, or its file or module cannot be read.
     """
     text = str(name_or_file)
     if SHIELDED in text and not Path(text).exists():
@@ -150,8 +155,7 @@ def _model_contestant(
 def _imported(name: str, kind: str) -> Any:
     """What ``module:name`` is, perhaps of the current directory; ``kind`` is for messages."""
     module_name, _, attribute = name.partition(":")
-    if str(Path.cwd()) not in sys.path:
-        sys.path.insert(0, str(Path.cwd()))
+    look_here()
     import_module("kinarm.envs")  # the module may make one by its id
     try:
         module = import_module(module_name)

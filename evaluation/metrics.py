@@ -44,9 +44,8 @@ class Metric:
         of trials; the formula also gets each trial by itself.
     needs_holding : bool
         Whether it needs trials that go on after success.
-    heading, spread_heading : str
-        Headings of its column, and of its range over training seeds; without
-        one it is in documents alone.
+    heading : str
+        Heading of its column; without one it is in documents alone.
     digits, shows_interval : int, bool
         Decimals, and whether the interval is shown.
     beside : tuple of str, optional
@@ -66,7 +65,6 @@ class Metric:
     digits: int = 3
     shows_interval: bool = False
     beside: tuple[str, str] | None = None
-    spread_heading: str = ""
     priority: float = 0
 
     def write(self, value: float, *, sign: str = "") -> str:
@@ -113,7 +111,6 @@ METRICS: dict[str, Metric] = {
         lambda trials: trials.success,
         heading="success %",
         shows_interval=True,
-        spread_heading="worst..best seed %",
         priority=ALWAYS,
     ),
     "relative_success": Metric(

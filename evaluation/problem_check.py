@@ -5,7 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from kinarm.contact_statistics import SAMPLES, ContactStatistics, random_configurations
+from kinarm.contact_pairs import random_configurations
+from kinarm.contact_statistics import SAMPLES, ContactStatistics
 from kinarm.evaluation.bounds import oracle_bounds
 from kinarm.evaluation.outcomes import Pair
 from kinarm.evaluation.report.templating import template_environment
@@ -70,7 +71,7 @@ def check_problem(
     on_progress : callable, optional
         Called with the number of trials solved so far and in all.
     """
-    q, starts = random_configurations(world.contact_model, SAMPLES), random_starts(world)
+    q, starts = random_configurations(world.arm, SAMPLES), random_starts(world)
     scenes = list(_some_scenes(world, q))
     contact = ContactStatistics.sample(world.contact_model, scenes=scenes)
     contact.check_movable(world.arm.name)
@@ -103,6 +104,6 @@ def random_starts(world: World) -> NDArray[np.float64]:
     task, home = world.problem.task, world.arm.home
     if task.starts:
         return world.starts
-    q = random_configurations(world.contact_model, 2000, seed=1)
+    q = random_configurations(world.arm, 2000, seed=1)
     starts: NDArray[np.float64] = home + task.start_spread * (q - home)
     return starts

@@ -155,13 +155,13 @@ class EvaluationRequest(ProblemOptions, TableOptions):
                 repr(self) if command is None else command,
                 next(iter(self.policies), ""),
             )
+            if self.out is not None:
+                write_text(self.out / DOCUMENT, json.dumps(document.to_json(), indent=1) + "\n")
             if self.report is not None:
                 from kinarm.evaluation.report.page import write_report
 
                 tell("writing the report")
                 write_report(self.report, document, evaluations)
-            if self.out is not None:
-                write_text(self.out / DOCUMENT, json.dumps(document.to_json(), indent=1) + "\n")
         return document
 
     def evaluate(self, tell: Tell = lambda _: None) -> "list[Evaluation]":

@@ -44,7 +44,8 @@ def select_pairs(request: "EvaluationRequest") -> list[Pair]:
         or each is not without
         or (each.recipe == SHOWN_SHIELDED and not request.policies)
     ]
-    chosen = [*bare, *(each for each in behind if each not in bare)]
+    known = {(each.name, each.source) for each in bare}
+    chosen = [*bare, *(each for each in behind if (each.name, each.source) not in known)]
     stated = request.matrix or (request.policies and named)
     pairs = [
         (contestant, problem)

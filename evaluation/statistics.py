@@ -55,14 +55,6 @@ class Estimate:
         return {"value": self.value, "ci95": self.ci95 and list(self.ci95)}
 
 
-def estimate_text(estimate: Estimate) -> str:
-    """A statistic and its interval in words."""
-    if estimate.value is None:
-        return "not measurable"
-    interval = "{:.3f}..{:.3f}".format(*estimate.ci95) if estimate.ci95 else "no interval"
-    return f"{estimate.value:.3f} ({interval})"
-
-
 Terms = Sequence[tuple[float, NDArray[Any]]]
 """Weights, and values of shape (n_seeds, n_trials)."""
 

@@ -135,8 +135,9 @@ def evaluation_document(
     """
     check_names((each.contestant, each.problem) for each in evaluations)
     any_set = evaluations[0].trials
-    firsts = {each.problem.name: each for each in reversed(evaluations)}
-    facing = {name: firsts[name] for name in reversed(firsts)}
+    facing: dict[str, Evaluation] = {}
+    for each in evaluations:
+        facing.setdefault(each.problem.name, each)
     protocol = Protocol(
         command=command,
         trials=len(any_set),

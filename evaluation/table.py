@@ -80,17 +80,17 @@ def difference_columns(
     ]
 
 
-def spread_column(name: str) -> Column[Row]:
-    """The column of a metric's range over training seeds; empty without seeds."""
-    metric = METRICS[name]
+def _seeds(row: Row) -> Cell:
+    """Number of training seeds."""
+    return Cell(str(len(row.members))) if isinstance(row, PooledResult) else Cell()
 
-    def cell(row: Row) -> Cell:
-        if not isinstance(row, PooledResult) or name not in row.spread:
-            return Cell()
-        return Cell(metric.write_range(row.spread[name].min, row.spread[name].max))
 
-    meaning = f"range over training seeds: {metric.meaning}"
-    return Column(metric.spread_heading, cell, f"{name}_range", meaning, SPREAD_PRIORITY)
+def _success_range(row: Row) -> Cell:
+    """Success of the worst and of the best training seed."""
+    if not isinstance(row, PooledResult) or "success" not in row.spread:
+        return Cell()
+    each = row.spread["success"]
+    return Cell(METRICS["success"].write_range(each.min, each.max))
 
 
 def all_columns() -> list[Column[Row]]:
@@ -99,22 +99,13 @@ def all_columns() -> list[Column[Row]]:
         Column("problem", attrgetter("problem"), priority=ALWAYS, words=True),
         Column("policy", attrgetter("policy"), priority=ALWAYS, words=True),
     ]
-    for name, metric in METRICS.items():
-        columns.append(metric_column(name, attrgetter("metrics")))
-        if name == "success":
-            columns.append(
-                Column(
-                    "seeds",
-                    lambda row: Cell(
-                        str(len(row.members)) if isinstance(row, PooledResult) else ""
-                    ),
-                    meaning="trainings of a recipe that differ in their seed alone",
-                    priority=SEEDS_PRIORITY,
-                )
-            )
-        if metric.spread_heading:
-            columns.append(spread_column(name))
-    return columns
+    success, *others = (metric_column(name, attrgetter("metrics")) for name in METRICS)
+    meaning = "trainings of a recipe that differ in their seed alone"
+    seeds = Column("seeds", _seeds, meaning=meaning, priority=SEEDS_PRIORITY)
+    meaning = "range over training seeds: " + METRICS["success"].meaning
+    heading = "worst..best seed %"
+    spread = Column(heading, _success_range, "success_range", meaning, SPREAD_PRIORITY)
+    return [*columns, success, seeds, spread, *others]
 
 
 def metric_columns() -> list[Column[Row]]:

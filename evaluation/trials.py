@@ -41,7 +41,7 @@ class TrialSet:
     ----------
     simulator, seed : Simulator, int
         What they are faced in, and what they were drawn from.
-    starts, goals : ndarray, shape (n, n_joints) and (n, 3)
+    starts, goals : ndarray, shape (n, n_joints) and (n, goal_width)
         Start configurations [rad or m] and goal positions [m].
     """
 

@@ -14,7 +14,7 @@ import kinarm
 from kinarm._fields import to_plain
 from kinarm._files import absolute, check_folder, shipped_files, write_atomically
 from kinarm.arm import Arm
-from kinarm.contact_statistics import random_configurations
+from kinarm.contact_pairs import random_configurations
 from kinarm.errors import InvalidInputError, OutputError, PolicyFileError, finite_array
 from kinarm.policies import arm_policy, self_test
 from kinarm.policies.conversion.to_torch import command_module, onnx_model
@@ -191,7 +191,7 @@ def _vectors(
 ) -> list[dict[str, list[float]]]:
     """Joint positions of arms at rest, goals, and kinarm's commands."""
     arm, n, resolution = world.arm, world.arm.n_actuated, contract["resolution"]
-    q, others = (random_configurations(world.contact_model, VECTORS, seed) for seed in (0, 1))
+    q, others = (random_configurations(world.arm, VECTORS, seed) for seed in (0, 1))
     goals, command = world.reached(others), q.copy()
     moved = q[:, :n] + policy(world.observe(q, goals)) * world.rules.step_limit
     command[:, :n] = np.clip(moved, arm.lower[:n], arm.upper[:n])

@@ -58,6 +58,10 @@ class TrainingState:
         """Number of finished iterations."""
         return len(self.curve)
 
+    def curve_with(self, point: CurvePoint) -> tuple[CurvePoint, ...]:
+        """The curve and one more point; to unpack it would take ten times as long."""
+        return self.curve + (point,)  # noqa: RUF005
+
     @property
     def environment_steps(self) -> int:
         """Steps taken so far."""
@@ -176,6 +180,12 @@ def learner_names() -> tuple[str, ...]:
     return tuple({**_SHIPPED, **_installed()})
 
 
+def look_here() -> None:
+    """Find modules in the current folder before others."""
+    if (here := str(Path.cwd())) not in sys.path:
+        sys.path.insert(0, here)
+
+
 def find_learner(name: str) -> Learner[Any, Any]:
     """Look a learner up by name or ``module:LEARNER``, also in the current folder.
 
@@ -187,8 +197,8 @@ def find_learner(name: str) -> Learner[Any, Any]:
     place = name if ":" in name else _SHIPPED.get(name) or _installed().get(name)
     if place is None:
         raise UnknownNameError("learner", name, (*learner_names(), "module:LEARNER"))
-    if place is name and str(Path.cwd()) not in sys.path:
-        sys.path.insert(0, str(Path.cwd()))
+    if place is name:
+        look_here()
     module, _, attribute = place.partition(":")
     try:
         found = getattr(import_module(module), attribute)

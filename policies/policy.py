@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
-from itertools import chain, count
+from itertools import chain
 from pathlib import Path
 from typing import IO, Any
 
@@ -123,8 +123,11 @@ class Policy:
     @property
     def layout(self) -> ObservationLayout:
         """Where the parts of an observation are."""
-        sizes = (ObservationLayout.sized(self.problem, n, self.n_actions) for n in count(1))
-        return next(each for each in sizes if each.size >= self.n_observations)
+        for n_joints in range(1, self.n_observations + 1):
+            layout = ObservationLayout.sized(self.problem, n_joints, self.n_actions)
+            if layout.size >= self.n_observations:
+                return layout
+        raise InvalidInputError(f"mean has {self.n_observations} values, its observation has fewer")
 
     @property
     def n_actions(self) -> int:

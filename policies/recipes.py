@@ -46,6 +46,11 @@ def recipe(learner: str, name_or_file: str | Path | None = None, **changes: Any)
     Returns
     -------
     ARSConfig, PPOConfig or settings of another learner
+
+    Raises
+    ------
+    UnknownNameError, InvalidInputError
+        If there is no such learner, recipe or setting, or a value cannot be.
     """
     found = find_learner(learner)
     available = init_fields(found.config)

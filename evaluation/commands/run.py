@@ -9,7 +9,13 @@ from typing import TYPE_CHECKING, Any, ClassVar, Literal
 from kinarm._command_line import run_request
 from kinarm._files import check_output
 from kinarm._interrupts import telling
-from kinarm.errors import FROM_ZERO, POSITIVE, InvalidInputError, RunStoppedError
+from kinarm.errors import (
+    FROM_ZERO,
+    POSITIVE,
+    POSITIVE_SHARE,
+    InvalidInputError,
+    RunStoppedError,
+)
 from kinarm.policies.running.watchdog import SafeLimits
 from kinarm.problem_options import ProblemOptions
 
@@ -118,7 +124,7 @@ class RunRequest(ArmOptions):
     goal: tuple[float, ...] = ()
     trials: int = 5
     seed: int = field(default=0, metadata=FROM_ZERO)
-    speed: float = field(default=0.2, metadata=POSITIVE)
+    speed: float = field(default=0.2, metadata=POSITIVE_SHARE)
     shield: bool = True
     watchdog: SafeLimits = field(default_factory=SafeLimits)
     record: Path | None = None

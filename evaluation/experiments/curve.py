@@ -1,5 +1,6 @@
 """Learning curves: the trials that policies face during a training."""
 
+import math
 import time
 from collections.abc import Iterator
 from dataclasses import dataclass, field
@@ -115,13 +116,13 @@ class Clock:
     Attributes
     ----------
     seconds, processor_seconds : float
-        Wall time and processor time [s].
+        Wall time and processor time [s]; NaN if unknown.
     points, processor_points : tuple of float
         The same at each point of the learning curve [s].
     """
 
-    seconds: float = 0.0
-    processor_seconds: float = 0.0
+    seconds: float = math.nan
+    processor_seconds: float = math.nan
     points: tuple[float, ...] = ()
     processor_points: tuple[float, ...] = ()
 
@@ -150,7 +151,7 @@ class CurveSoFar:
 
     points: tuple[CurvePoint, ...] = ()
     distances: NDArray[np.float32] = field(default_factory=lambda: np.empty(0, np.float32))
-    clock: Clock = Clock()
+    clock: Clock = Clock(0.0, 0.0)
 
 
 class Curve:

@@ -3,7 +3,6 @@
 import os
 import pickle
 import queue
-import sys
 import threading
 import time
 import traceback
@@ -11,12 +10,12 @@ import warnings
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any, NamedTuple, Protocol
 
 from kinarm._files import first_line
 from kinarm._interrupts import kept_from_children
 from kinarm.errors import WorkerError
+from kinarm.policies.learners import look_here
 
 
 class Failure(NamedTuple):
@@ -58,8 +57,7 @@ def attempt(work: Callable[[Any], Any], task: bytes) -> Any:
 
     Its learner may be in a module of the current directory.
     """
-    if str(Path.cwd()) not in sys.path:
-        sys.path.append(str(Path.cwd()))
+    look_here()
     try:
         return work(pickle.loads(task))
     except Exception as error:  # whatever it is, other tasks go on
@@ -119,7 +117,7 @@ class LocalExecutor:
                 for task in tasks:
                     under_way[pool.submit(attempt, work, pickle.dumps(task))] = task
             for done in as_completed(under_way):
-                yield under_way[done], done.result()
+                yield under_way.pop(done), done.result()
         except BrokenExecutor as error:
             raise WorkerError(
                 "workers ended unexpectedly, perhaps for want of memory; the same command goes on "

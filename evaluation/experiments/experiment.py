@@ -232,6 +232,8 @@ class Experiment(Checked):
         chosen = tuple(known[name] for name in dict.fromkeys(entries)) or self.entries
         if problems:
             chosen = tuple(replace(entry, problems=()) for entry in chosen)
+        if seeds is not None:
+            chosen = tuple(replace(entry, seeds=0) for entry in chosen)
         return replace(
             self,
             entries=chosen,

@@ -98,8 +98,7 @@ class TrainedRun:
         ]
         timed = list(zip(self.curve, *columns, strict=True))
         if not self.curve or self.curve[-1].iteration < self.last.iteration:
-            known = clock.seconds or math.nan, clock.processor_seconds or math.nan
-            timed.append((self.last, *known))
+            timed.append((self.last, clock.seconds, clock.processor_seconds))
         return timed
 
 

@@ -9,7 +9,7 @@ import tomli_w
 
 from kinarm._fields import to_plain
 from kinarm._files import first_line, write_text
-from kinarm.errors import KinarmError, needed
+from kinarm.errors import KinarmError, TrainingFailedError, needed
 from kinarm.evaluation.experiments.experiment import SAMPLERS, Experiment
 from kinarm.evaluation.experiments.plan import Run, plan
 from kinarm.evaluation.experiments.store import Store
@@ -64,21 +64,28 @@ def carry_out_search(experiment: Experiment, store: Store, jobs: int, train_all:
         Settings tried at a time.
     train_all : callable
         Trains some runs; the store says why others failed.
+
+    Raises
+    ------
+    TrainingFailedError
+        If too many settings were impossible.
     """
     # A process that was killed may have left its lock.
     for left in store.folder.glob(f"{JOURNAL}.lock*"):
         left.unlink(missing_ok=True)
-    search, failed = _open_search(experiment, store.folder), 0
+    search, failed = _open_search(experiment, store.folder), dict[str, str]()
     for trial in search.trials:
         if trial.state.name == "RUNNING":
             search.tell(trial.number, state=type(trial.state).FAIL)
             search.enqueue_trial(trial.params)
     count = experiment.search["count"]
-    while failed < FAILURES and (missing := count - len(_complete(search))) > 0:
-        failed += _try_settings(experiment, search, store, min(jobs, missing), train_all)
+    while len(failed) < FAILURES and (missing := count - len(_complete(search))) > 0:
+        failed |= _try_settings(experiment, search, store, min(jobs, missing), train_all)
     if _complete(search):
         best = plan(experiment, [_choices(experiment, search.best_trial)])[0]
         write_text(store.folder / RECIPE, tomli_w.dumps(recipe_entries(best.config)))
+    if missing:
+        raise TrainingFailedError(failed, len(search.trials))
 
 
 def _try_settings(
@@ -87,11 +94,11 @@ def _try_settings(
     store: Store,
     count: int,
     train_all: TrainAll,
-) -> int:
-    """Train with some proposals on all problems with all seeds; return how many failed."""
+) -> dict[str, str]:
+    """Train with some proposals on all problems with all seeds; return why others failed."""
     from optuna.trial import TrialState
 
-    planned, errors = [], dict[Any, str | None]()
+    planned, errors = [], dict[Any, str]()
     for trial in (search.ask() for _ in range(count)):
         choices = {key: _suggest(trial, key, entry) for key, entry in experiment.searched.items()}
         try:
@@ -104,14 +111,14 @@ def _try_settings(
     found = store.load(runs)
     for trial, each in planned:
         if lost := [run for run in each if run not in found]:
-            errors[trial] = store.failure(lost[0])
+            errors[trial] = store.failure(lost[0]) or "unknown"
         else:
             shares = [float(found[run].outcomes.success.mean()) for run in each]
             search.tell(trial, float(np.mean(shares)))
     for trial, why in errors.items():
         trial.set_user_attr("error", why)
         search.tell(trial, state=TrialState.FAIL)
-    return len(errors)
+    return {f"settings {trial.number}": why for trial, why in errors.items()}
 
 
 def _complete(search: "optuna.study.Study") -> "list[optuna.trial.FrozenTrial]":

@@ -78,7 +78,6 @@ class Store:
         write_text(self.path("made", run), json.dumps(to_plain(made)) + "\n")
         write_atomically(self.path("runs", run), lambda file: file.write(result.content))
         failure.unlink(missing_ok=True)
-        self.path("checkpoints", run).unlink(missing_ok=True)
 
     def clear(self, runs: Iterable[Run]) -> None:
         """Remove trainings, and the folder if nothing else lies there; not one that goes on."""

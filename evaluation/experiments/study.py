@@ -1,6 +1,5 @@
 """A study: an experiment in its folder, how to run it, and its results."""
 
-import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
@@ -166,6 +165,7 @@ class Study:
                     failures[run.name] = result.error
                 else:
                     on_trained(run, result)
+                    self.store.path("checkpoints", run).unlink(missing_ok=True)
                 done.append(run.name)
                 show()
         return failures
@@ -325,8 +325,8 @@ class Study:
                     **{field: run.choices.get(field) for field in fields},
                     "iterations": trained.last.iteration,
                     "environment_steps": trained.last.environment_steps,
-                    "seconds": clock.seconds or math.nan,
-                    "processor_seconds": clock.processor_seconds or math.nan,
+                    "seconds": clock.seconds,
+                    "processor_seconds": clock.processor_seconds,
                     **figures_of(outcomes),
                     "key": run.key,
                 }

@@ -105,16 +105,8 @@ class Group:
 
     @property
     def processor_seconds(self) -> float:
-        """Processor time of a training, mean over the seeds [s]."""
+        """Processor time of a training, mean over the seeds [s]; NaN if unknown."""
         return float(np.mean([run.clock.processor_seconds for run in self.runs]))
-
-    @property
-    def steps_to_success(self) -> float | None:
-        """Median steps of successful trials, mean over seeds; None if a seed has none."""
-        if not self.hits.any(axis=1).all():
-            return None
-        each = [np.median(run.outcomes.steps[run.outcomes.success]) for run in self.runs]
-        return float(np.mean(each))
 
     def until(self, level: float) -> tuple[float, float, float]:
         """Effort until policies reach a level of success; medians over seeds.
@@ -186,9 +178,12 @@ def _number_column(
 ) -> Column[Group]:
     """The column of a number, which is shown per a unit."""
     digits = 1 if heading.endswith("%") else 2
-    return Column(
-        heading, lambda group: f"{value(group) / per:.{digits}f}", name, priority=priority
-    )
+
+    def text(group: Group) -> str:
+        number = value(group) / per
+        return "" if math.isnan(number) else f"{number:.{digits}f}"
+
+    return Column(heading, text, name, priority=priority)
 
 
 COLUMNS: tuple[Column[Group], ...] = (
@@ -245,18 +240,20 @@ def group_entries(group: Group) -> dict[str, Any]:
         "success": group.success.to_json(),
         "difference": group.first
         and {"first": group.first.label, "success": group.difference.to_json()},
+        **{name: group.estimates[name].value for name in FIGURES[1:]},
         "collision": share_over_seeds(touched).to_json(),
         "success_each": group.hits.mean(axis=1).tolist(),
-        "median_distance": float(np.mean([run.last.median_distance for run in group.runs])),
-        "steps_to_success": group.steps_to_success,
         "environment_steps": group.environment_steps,
-        "seconds": float(np.mean([run.clock.seconds for run in group.runs])),
-        "processor_seconds": group.processor_seconds,
+        "seconds": _known(float(np.mean([run.clock.seconds for run in group.runs]))),
+        "processor_seconds": _known(group.processor_seconds),
         "until": [_until_entries(group, level) for level in LEVELS],
     }
 
 
 def _until_entries(group: Group, level: float) -> dict[str, Any]:
     names = ("environment_steps", "seconds", "processor_seconds")
-    known = [value if math.isfinite(value) else None for value in group.until(level)]
-    return {"success": level, **dict(zip(names, known, strict=True))}
+    return {"success": level, **dict(zip(names, map(_known, group.until(level)), strict=True))}
+
+
+def _known(value: float) -> float | None:
+    return value if math.isfinite(value) else None

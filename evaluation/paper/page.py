@@ -24,7 +24,6 @@ from kinarm.evaluation.paper.results import (
     final_distances,
 )
 from kinarm.evaluation.report.templating import template_environment
-from kinarm.evaluation.statistics import estimate_text
 from kinarm.policies.provenance import package_versions
 from kinarm.problem import PROBLEMS
 
@@ -131,7 +130,7 @@ def reproduction_page(results: PaperResults, claims: Claims, document: Mapping[s
         oracle_bounds=oracle_bounds,
         final_distances=final_distances,
         steps_to_levels=steps_to_levels,
-        contact=lambda runs: np.mean([run.trained.outcomes.collision.mean() for run in runs]),
+        ended=lambda runs, how: np.mean([getattr(run.trained.outcomes, how) for run in runs]),
         median=np.median,
     )
 
@@ -161,7 +160,7 @@ def claim_rows(claims: Iterable[Claim]) -> list[tuple[str, ...]]:
         (
             claim.statement if part is claim.parts[0] else "",
             part.measure,
-            estimate_text(part.estimate),
+            str(part.estimate),
             f"{part.claimed} {part.threshold:g}",
             claim.verdict if part is claim.parts[0] else "",
         )

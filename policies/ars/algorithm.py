@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kinarm.episodes import Rollouts
+from kinarm.errors import InvalidInputError
 from kinarm.failed_scenarios import FailedScenarios, StartsAndGoals
 from kinarm.kernels.compiling import Array
 from kinarm.networks import Layer, Mirror, Networks
@@ -52,6 +53,10 @@ class ARSTraining:
             theta = parameters_of(policy)
             if self.config.normalize:
                 normalizer = statistics(policy)
+            elif policy.mean.any() or (policy.std != 1).any():
+                raise InvalidInputError(
+                    "initial_policy normalises observations: without normalize it is another one"
+                )
         elif self.config.net_arch:
             deviations = first_deviations(self.simulator.world.layout)
             theta = initial_network(rng, deviations, self._widths[1:])
@@ -102,12 +107,12 @@ class ARSTraining:
             normalizer=normalizer,
             generator=dict(rng.bit_generator.state),
             failed=failed,
-            curve=(*state.curve, point),
+            curve=state.curve_with(point),
         )
 
 
 class Scenarios(NamedTuple):
-    """Starts and goals of an iteration, which are replayed, and copies of each.
+    """Starts (n, n_joints), goals (n, goal_width), which are replayed, and copies of each.
 
     Repeated, they are those of the episodes in the order sign, direction, episode.
     """

@@ -126,7 +126,7 @@ class PPOTraining:
             episodes=arms.states(),
             failed=arms.failed,
             scenarios=arms.scenarios,
-            curve=(*state.curve, point),
+            curve=state.curve_with(point),
         )
 
 

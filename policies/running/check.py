@@ -93,7 +93,7 @@ class ContractCheck:
                 why = "its offset, scale or sign"
                 if abs(found + pose) < PLACED:
                     why = "its sign"
-                elif max(abs(found / pose), abs(pose / found)) > 40.0:
+                elif 0.0 < 40.0 * min(abs(found), abs(pose)) < max(abs(found), abs(pose)):
                     why = "degrees or radians, or its offset"
                 elif len(there):
                     why = f"its offset, or the order, for {' or '.join(there)} is there"

@@ -129,7 +129,7 @@ class SB3Training:
             environment_steps=model.num_timesteps,
             wall_time=state.wall_time + time.perf_counter() - began,
         )
-        return SB3State(curve=(*state.curve, point), training=self)
+        return SB3State(curve=state.curve_with(point), training=self)
 
     def model(self, iteration: int) -> BaseAlgorithm:
         """The algorithm after an iteration, repeated if need be."""

@@ -55,7 +55,9 @@ def test_help_fits_a_terminal(run, words, monkeypatch):
     assert [line for line in answer.out.splitlines() if len(line) > 80] == []
 
 
-@pytest.mark.parametrize(("words", "unbuffered"), [("--help", "1"), ("zero --task left", "")])
+@pytest.mark.parametrize(
+    ("words", "unbuffered"), [("--help", "1"), ("zero --task left --trials 1 --no-oracle", "")]
+)
 def test_a_closed_pipe_shows_no_error(command, words, unbuffered):
     with subprocess.Popen(
         command("kinarm-eval", *words.split()),

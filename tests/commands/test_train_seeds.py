@@ -6,6 +6,7 @@ from pathlib import Path
 import pytest
 from equal_policies import check_equal
 
+from kinarm.errors import OutputError
 from kinarm.evaluation.experiments import runs as experiments
 from kinarm.policies import Policy, recipe, train_policy
 
@@ -87,6 +88,25 @@ def test_a_policy_that_was_not_written_is_made_again_and_more_seeds_are_trained(
     check_equal(Policy.load(tmp_path / f"{NAME.format(1)}.npz"), train_policy(config(1)).policy)
     answer = run("kinarm-train", *arguments, "--seeds", 2)
     assert answer.out.count("finished earlier") == 2
+
+
+def test_a_training_whose_policy_cannot_be_written_goes_on(run, tmp_path, monkeypatch):
+    """From its last checkpoint, which only a written policy makes superfluous."""
+    out = tmp_path / "a.npz"
+    arguments = ("ars", "--problem", "right", "--iterations", 9, *SMALL, "--out", out)
+    monkeypatch.setattr(experiments, "CHECKPOINT_SECONDS", 0.0)
+    with monkeypatch.context() as patch:
+        patch.setattr(Policy, "save", failing)
+        assert run("kinarm-train", *arguments).status == 2
+    assert len(list(tmp_path.rglob("checkpoints/*.npz"))) == 1
+    answer = run("kinarm-train", *arguments)
+    assert answer.status == 0, answer.err
+    check_equal(Policy.load(out), train_policy(config(0)).policy)
+    assert [path.name for path in sorted(tmp_path.iterdir())] == ["a.curve.csv", "a.npz"]
+
+
+def failing(*_, **__):
+    raise OutputError("no space left")
 
 
 @pytest.mark.parametrize(

@@ -77,7 +77,7 @@ def test_listed_trials_can_be_simulated_again(evaluations, skilled, monkeypatch)
     document = made_of(evaluations)
     entry, row = document["protocol"]["problems"]["right"], document["results"][1]
     reference = ReferenceSimulator(Simulator(ReachProblem.from_json(entry["problem"])))
-    for i in range(25):
+    for i in range(12):
         start, goal = np.array(entry["starts"][i]), np.array(entry["goals"][i])
         episode = reference.rollout(skilled, start, goal)
         outcomes = {name: values[i] for name, values in row["outcomes"].items()}

@@ -1,10 +1,13 @@
 """Trials that success does not end, against an environment that is stepped and Pinocchio."""
 
+from dataclasses import replace
+
 import gymnasium
 import numpy as np
 import pytest
 
 import kinarm  # noqa: F401 registers the environments
+from kinarm.evaluation import pool
 from kinarm.evaluation.contestants import AIM, ORACLE, Contestant, measure_holding
 from kinarm.evaluation.evaluation import run_trials
 from kinarm.evaluation.finding import find_contestants
@@ -68,6 +71,18 @@ def test_what_ends_at_success_stays_as_it_was(skilled, trials, skilled_evaluatio
     assert rows[1]["outcomes"] == rows[0]["outcomes"]
     assert set(rows[1]) - set(rows[0]) == {"held"}
     assert rows[1]["held"]["closest"] == evaluation.holding.closest.tolist()
+
+
+def test_seeds_of_which_some_were_not_held_have_no_such_figures(skilled, trials):
+    made = [replace(skilled.provenance, seed=seed) for seed in (0, 1)]
+    seeds = [replace(skilled, provenance=each) for each in made]
+    members = [
+        run_trials(Contestant.from_policy(f"skilled-seed{n}", seed), trials, hold=n == 0)
+        for n, seed in enumerate(seeds)
+    ]
+    (pooled,) = pool(members)
+    assert pooled.metrics["held"].value is None
+    assert pooled.metrics["success"].value == members[0].metrics["success"].value
 
 
 def test_the_oracle_aims_closer_and_stays(trials):

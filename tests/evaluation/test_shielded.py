@@ -8,7 +8,7 @@ from kinarm.errors import PolicyFileError
 from kinarm.evaluation import EvaluationRequest, ReplayRequest, evaluate
 from kinarm.evaluation.commands.replay import described
 from kinarm.evaluation.finding import contestant_of, find_contestants
-from kinarm.evaluation.selection import group_names
+from kinarm.evaluation.selection import group_names, select_pairs
 from kinarm.policies import Policy, PPOConfig, load_policy, train_policy
 from kinarm.recording import load_recordings, record_rollouts, save_recordings
 
@@ -40,6 +40,12 @@ def test_it_has_a_name_and_a_group_of_its_own(policy):
     names = group_names((*shielded, *find_contestants("ars-linear-both")))
     assert set(names.values()) == {"ars-linear-both", "ars-linear-both+shield"}
     assert shielded[0].shielded() is shielded[0]
+
+
+def test_what_is_named_with_its_shield_too_comes_once():
+    request = EvaluationRequest(policies=(NAME, f"{NAME}+shield"), shield=True, oracle=False)
+    names = [contestant.name for contestant, _ in select_pairs(request)]
+    assert names == [NAME, "ars-linear-both+shield-seed0"]
 
 
 def test_wrappers_and_shields_go_together(policy):

@@ -9,7 +9,6 @@ from scipy import optimize, special, stats
 from kinarm.evaluation.statistics import (
     Estimate,
     contrast,
-    estimate_text,
     mean_share,
     share_difference,
     share_over_seeds,
@@ -232,9 +231,3 @@ class TestSuperiority:
             low, high = superiority(pairs).ci95
             hits += low < truth < high
         assert hits / 400 >= 0.95
-
-
-def test_estimates_in_words():
-    assert estimate_text(Estimate(0.5, (0.25, 0.75))) == "0.500 (0.250..0.750)"
-    assert estimate_text(Estimate(0.5)) == "0.500 (no interval)"
-    assert estimate_text(Estimate(None)) == "not measurable"

@@ -14,7 +14,7 @@ from known_arms import INSTALLED
 from random_policies import policy_for, sliding
 
 from kinarm import ReachProblem, Scene, Simulator
-from kinarm.contact_statistics import random_configurations
+from kinarm.contact_pairs import random_configurations
 from kinarm.errors import ArmError, InvalidInputError, OutputError
 from kinarm.observation import OBSERVATION
 from kinarm.observation_choice import Observation
@@ -32,7 +32,7 @@ EMPTY = Scene(obstacles=(), ground=False)
 def states(simulator, n=N):
     """Configurations that touch nothing, and goals that others reach."""
     world = simulator.world
-    q, others = (random_configurations(world.contact_model, n, seed) for seed in (0, 1))
+    q, others = (random_configurations(world.arm, n, seed) for seed in (0, 1))
     free = ~world.in_contact(q)
     return q[free], world.reached(others[free])
 

@@ -206,8 +206,8 @@ class TestTransferByReflection:
         assert len(symmetric) >= 10 if arm in SYMMETRIC_ARMS else not symmetric
         learnt = load_policy("ppo-paper-both-seed0"), load_policy("ars-tuned-both-seed0")
         plain = *learnt, lively(make_policy(8, seed=4), 30)
-        for problem, policy in product(symmetric, plain):
-            simulator = Simulator(problem, threads=1)
+        faced = [Simulator(problem, threads=1) for problem in symmetric]
+        for simulator, policy in product(faced, plain):
             mirror = find_mirror(simulator.world)
             mirrored, signs = replace(policy, mirror=mirror), np.append(mirror.actions, 1)
             starts, goals = simulator.sample(np.random.default_rng(2), 50)

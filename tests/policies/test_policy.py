@@ -2,6 +2,7 @@
 
 import gc
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -155,6 +156,14 @@ class TestInvariants:
         }
         with pytest.raises(InvalidInputError, match=message):
             Policy(**{**parts, **changes})
+
+
+def test_observations_that_no_arm_has_are_refused(provenance):
+    problem = provenance.problem.replace(observation=["goal"])
+    layers = (Layer(np.ones((5, 5)), np.zeros(5)),)
+    policy = Policy(np.zeros(5), np.ones(5), layers, replace(provenance, problem=problem))
+    with pytest.raises(InvalidInputError, match="mean has 5 values, its observation has fewer"):
+        policy.layout  # noqa: B018
 
 
 class TestCheckArm:

@@ -86,14 +86,14 @@ def test_others_are_refused(tmp_path, network_file):
         first_policy(ARSConfig(initial_policy=str(tmp_path / "biased.npz")))
 
 
-def test_statistics_are_taken_where_they_are_used():
-    policy = "ars-tuned-both-seed1"
-    states = [
-        next(training_states(ARSConfig(initial_policy=policy, normalize=normalize)))
-        for normalize in (True, False)
-    ]
-    assert [state.normalizer.count > 0 for state in states] == [True, False]
-    np.testing.assert_array_equal(states[0].theta, states[1].theta)
+def test_a_policy_that_normalises_is_refused_where_none_does(tmp_path):
+    policy = load_policy("ars-tuned-both-seed1")
+    with pytest.raises(InvalidInputError, match="normalises observations"):
+        first_policy(ARSConfig(initial_policy="ars-tuned-both-seed1", normalize=False))
+    plain = replace(policy, mean=np.zeros(48), std=np.ones(48))
+    plain.save(tmp_path / "plain.npz")
+    config = ARSConfig(initial_policy=str(tmp_path / "plain.npz"), normalize=False)
+    same_deeds(first_policy(config), plain)
 
 
 def test_steps_are_those_of_the_training():

@@ -32,7 +32,7 @@ FIRST_DECAY, SECOND_DECAY, EPSILON = 0.9, 0.999, 1e-5
 
 
 class Experience(NamedTuple):
-    """Experience of a rollout, one row a step.
+    """Experience of a rollout: observations and actions (n_steps, width), and numbers (n_steps,).
 
     Actions are not clipped. Scales tell by how much their noise was wider than usual, densities are
     the logarithms of its probability densities, over the scale.

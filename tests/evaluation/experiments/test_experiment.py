@@ -140,6 +140,11 @@ class TestRuns:
         assert [run.choices for run in runs[:3]] == [{"episodes": 1}, {"episodes": 2}, {}]
         assert (runs[0].config.noise, runs[2].config.n_epochs) == (0.5, 2)
 
+    def test_other_seeds_are_those_of_every_entry(self, experiment):
+        entries = [{"name": "a", "learner": "ars", "seeds": 5}, {"name": "b", "learner": "ars"}]
+        made = Experiment.from_json({"name": "x", "entries": entries, "seeds": 2}, "x")
+        assert [run.config.seed for run in plan(made.only(seeds=1))] == [0, 0]
+
     def test_entries_that_come_to_the_same_are_both_told_of(self):
         runs = planned(entries=[{"name": "a"}, {"name": "b"}])
         assert [run.entry.name for run in runs] == ["a", "b"]

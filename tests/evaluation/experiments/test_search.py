@@ -3,7 +3,7 @@
 import pytest
 from small_studies import SMALL
 
-from kinarm.errors import InvalidInputError
+from kinarm.errors import InvalidInputError, TrainingFailedError
 from kinarm.evaluation.experiments import study as studies
 from kinarm.evaluation.experiments.executors import LocalExecutor
 from kinarm.evaluation.experiments.experiment import Experiment
@@ -85,6 +85,12 @@ class TestSearch:
         for trial in trials:
             if trial not in complete:
                 assert "top_directions must be at most" in trial.user_attrs["error"]
+
+    def test_too_many_impossible_settings_are_told(self, tmp_path):
+        never = {"count": 2, "top_directions": {"low": 5, "high": 6}}
+        fixed = {"iterations": 3, "directions": 4}
+        with pytest.raises(TrainingFailedError, match="settings 0: top_directions must be at most"):
+            Study({**SEARCH, "fixed": fixed, "search": never}, tmp_path).run(jobs=1)
 
     def test_trainings_that_fail_are_replaced_by_others(self, tmp_path, monkeypatch):
         failed = []

@@ -22,8 +22,9 @@ class TestDensity:
 
     def test_of_many_normal_samples(self):
         samples = np.random.default_rng(1).normal(1.5, 0.2, 4_000)
-        expected = np.exp(-(((self.POSITIONS - 1.5) / 0.2) ** 2) / 2) / (0.2 * np.sqrt(2 * np.pi))
-        np.testing.assert_allclose(density(samples, self.POSITIONS), expected, atol=0.1)
+        places = self.POSITIONS[::50]
+        expected = np.exp(-(((places - 1.5) / 0.2) ** 2) / 2) / (0.2 * np.sqrt(2 * np.pi))
+        np.testing.assert_allclose(density(samples, places), expected, atol=0.1)
 
 
 @pytest.fixture(scope="module")

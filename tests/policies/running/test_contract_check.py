@@ -1,6 +1,7 @@
 """The check of a contract: errors of all kinds are caught, and none is imagined."""
 
 import re
+import warnings
 
 import numpy as np
 import pytest
@@ -45,6 +46,12 @@ def changed(joint, factor=1.0, shift=0.0):
 )
 def test_says_what_is_wrong(world, reads, takes, words):
     assert re.search(words, "\n".join(said(world, reads, takes)))
+
+
+def test_a_pose_of_zero_tells_nothing_of_units(world):
+    with warnings.catch_warnings(action="error"):
+        (line,) = said(world, changed(0, 1.0, 0.3), np.copy, POSE * [0, 1, 1, 1, 1, 1])
+    assert line == "axis_1 reads 0.300, and is at 0.000: its offset, scale or sign"
 
 
 def test_sign_of_a_command_shows_at_zero(world):

@@ -1,5 +1,7 @@
 """Bounds over boxes, held against configurations in them; lanes, against numbers."""
 
+from functools import cache
+
 import numpy as np
 import pinocchio as pin
 import pytest
@@ -112,11 +114,16 @@ def drawn_boxes(simulator, seed, count):
     return centres, halves, goals
 
 
+@cache
+def bounds_of(simulator):
+    return MotionBounds.of(simulator.arm.chain, simulator.n_actions)
+
+
 def examined(simulator, centre, half, goal, cutoff=0.0, turn=None):
     """Results of `examine`, and the corners that are left."""
     chain, n = simulator.arm.chain, simulator.n_actions
     turn = no_turn(n) if turn is None else turn
-    bounds, shapes = MotionBounds.of(chain, n), simulator.world.contact_model.shapes
+    bounds, shapes = bounds_of(simulator), simulator.world.contact_model.shapes
     box, results = np.concatenate([centre[:n] - half, centre[:n] + half])[None], np.zeros(6)
     space = work_space(simulator, n_axes=len(turn.axes))
     parts = (centre[None].copy(), half, box, results, space)
@@ -293,7 +300,7 @@ class TestLanes:
     def test_have_the_bits_of_numbers(self, any_simulator):
         simulator, n = any_simulator, any_simulator.n_actions
         chain = simulator.arm.chain
-        bounds, shapes = MotionBounds.of(chain, n), simulator.world.contact_model.shapes
+        bounds, shapes = bounds_of(simulator), simulator.world.contact_model.shapes
         centres, halves, goals = drawn_boxes(simulator, 7, 40 * LANES)
         touching = 0
         for first in range(0, len(centres), LANES):
