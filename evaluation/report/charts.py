@@ -5,12 +5,15 @@ from itertools import islice, pairwise
 from typing import NamedTuple
 
 import numpy as np
+from scipy.spatial import ConvexHull
 
 from kinarm.evaluation.figures import BIN_WIDTH
 from kinarm.evaluation.metrics import LIMITS
 from kinarm.evaluation.report.groups import Group, ProblemResults
 from kinarm.evaluation.statistics import Estimate, share_over_seeds
-from kinarm.scene import GoalRegion
+from kinarm.meshes import coal_shape
+from kinarm.scene import GoalRegion, Scene
+from kinarm.viewer.meshes import from_coal
 
 POINTS = 121
 """Distances of a profile, beside those of the table."""
@@ -64,6 +67,18 @@ class View(NamedTuple):
         corners += [corner[:2] for region in regions for corner in (region.lower, region.upper)]
         low, high = np.min(corners, axis=0) - MAP_MARGIN, np.max(corners, axis=0) + MAP_MARGIN
         return cls((float(low[0]), float(high[0])), (float(low[1]), float(high[1])))
+
+
+def footprints(scene: Scene, view: View) -> list[tuple[str, list[list[float]]]]:
+    """Names of the obstacles in view, and their outlines from above [m]; half-spaces have none."""
+    (low, high), found = np.array(view).T, []
+    for body in scene.bodies[: len(scene.obstacles)]:
+        if body.shape != "halfspace":
+            placed = from_coal(coal_shape(body)).moved(body.position, body.rotation)
+            points = placed.vertices[:, :2]
+            if (points.min(axis=0) < high).all() and (low < points.max(axis=0)).all():
+                found.append((body.name, points[ConvexHull(points).vertices].tolist()))
+    return found
 
 
 def worst_outcomes(group: Group) -> list[str]:

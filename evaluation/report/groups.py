@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kinarm.errors import InvalidInputError
-from kinarm.evaluation.contestants import Contestant
+from kinarm.evaluation.contestants import UNTRAINED, Contestant
 from kinarm.evaluation.document import EvaluationDocument, FacedProblem, PooledResult, Row
 from kinarm.evaluation.evaluation import Evaluation
 from kinarm.evaluation.replay.recordings import record
@@ -22,9 +22,6 @@ from kinarm.scene import GoalRegion
 
 PAGE_COLOURS, PAGE_DASHES = 6, 4
 """Colours and dashes of the style sheet for policies."""
-
-UNTRAINED_ALGORITHMS = ("baseline", "oracle")
-"""Algorithms of contestants that are no policies."""
 
 BEST_GROUPS, TRIALS, AT_LEAST = 4, 9, 3
 """Groups with worst trials, trials that they share, and the least each."""
@@ -49,7 +46,7 @@ class Group:
     @property
     def is_policy(self) -> bool:
         """Whether it is neither a baseline nor the oracle."""
-        return self.row.algorithm not in UNTRAINED_ALGORITHMS
+        return self.members[0].contestant not in UNTRAINED.values()
 
     @cached_property
     def distances(self) -> NDArray[np.float64]:
@@ -122,7 +119,7 @@ def group_results(
 def _styles(contestants: Mapping[str, Contestant]) -> dict[str, str]:
     """Classes by label, in the order of appearance."""
     styles = {label: f"reference {each.name}" for label, each in contestants.items()}
-    trained = (k for k, each in contestants.items() if each.algorithm not in UNTRAINED_ALGORITHMS)
+    trained = (k for k, each in contestants.items() if each not in UNTRAINED.values())
     for number, label in enumerate(trained):
         dash, colour = divmod(number, PAGE_COLOURS)
         styles[label] = f"colour{colour} dash{dash % PAGE_DASHES}"

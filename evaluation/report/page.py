@@ -4,13 +4,19 @@ from collections.abc import Sequence
 from functools import partial
 from operator import attrgetter
 from pathlib import Path
+from typing import Any
 
 from kinarm._files import check_folder, write_text
 from kinarm.evaluation.document import EvaluationDocument
 from kinarm.evaluation.evaluation import Evaluation
 from kinarm.evaluation.outcomes import EARLY_STEPS
 from kinarm.evaluation.report import charts
-from kinarm.evaluation.report.groups import group_results, record_worst, worst_trials
+from kinarm.evaluation.report.groups import (
+    ProblemResults,
+    group_results,
+    record_worst,
+    worst_trials,
+)
 from kinarm.evaluation.report.templating import template_environment
 from kinarm.evaluation.table import (
     SPREAD_PRIORITY,
@@ -64,8 +70,6 @@ def report_page(document: EvaluationDocument, evaluations: Sequence[Evaluation])
         If the document is of others, or two of them cannot be told apart.
     """
     problems = group_results(document, evaluations)
-    chosen = [worst_trials(results) for results in problems]
-    recordings = record_worst([worst for each in chosen for worst in each])
     template = template_environment(autoescape=True).get_template("page.html")
     return template.render(
         protocol=document.protocol,
@@ -74,9 +78,21 @@ def report_page(document: EvaluationDocument, evaluations: Sequence[Evaluation])
         difference_columns=difference_columns,
         columns=metric_columns(),
         shown_columns=partial(telling_columns, priority=SPREAD_PRIORITY),
-        worst=list(zip(problems, chosen, strict=True)),
-        replay=replay_page(recordings).html,
+        theatres=_theatres(problems),
         charts=charts,
         success_cell=metric_column("success", attrgetter("metrics")).cell,
         early_steps=EARLY_STEPS,
     )
+
+
+def _theatres(problems: Sequence[ProblemResults]) -> list[tuple[list[Any], str]]:
+    """Problems with their worst trials, and a replay of these, for each arm and scene."""
+    shared: dict[Any, list[Any]] = {}
+    for results in problems:
+        problem = results.trials.problem
+        place = shared.setdefault((problem.arm_digest, problem.scene), [])
+        place.append((results, worst_trials(results)))
+    return [
+        (each, replay_page(record_worst([row for _, rows in each for row in rows])).html)
+        for each in shared.values()
+    ]

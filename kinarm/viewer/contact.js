@@ -5,6 +5,7 @@
 const CLOSE = 5e-7; // bodies this far apart touch: half of the distance that Coal may take for none [m]
 const TOUCHING = 1e-6; // bodies that come this close in a motion touch, as in `kinarm.step_contact` [m]
 const TOLD_APART = 2.5e-7; // distances that differ less are the same there [m]
+const MOST_ASKED = 20000; // distances in a motion, after which it touches, as there
 const NARROW = 1e-10; // bounds of a distance that are this close decide [m]
 const MOST_CUTS = 200;
 
@@ -126,9 +127,9 @@ function nearness(first, second, enough) {
 }
 
 /** Height of a body above a half-space [m], and its lowest point, on or below the surface. */
-function height(body, { normal, offset }) {
+function height(body, { normal, offset, standing }) {
   const lowest = body.support(normal.map((value) => -value));
-  const apart = dot(normal, lowest) - offset - body.radius;
+  const apart = dot(normal, minus(lowest, standing.slice(13))) - offset - body.radius;
   return { apart, point: lowest.map((value, k) => value - normal[k] * (body.radius + Math.max(apart, 0))) };
 }
 
@@ -136,7 +137,7 @@ function height(body, { normal, offset }) {
 class ContactTest {
   constructor({ axes, bodies, pairs, travel }) {
     this.kinematics = new Kinematics(axes);
-    this.bodies = bodies.map((body) => (body.points ? new Body(body) : body));
+    this.bodies = bodies.map((body) => (body.points ? new Body(body) : { ...body, standing: WORLD }));
     this.pairs = pairs;
     this.travel = travel; // how far a joint moves the bodies of a pair at most, as in `ContactShapes`
   }
@@ -152,12 +153,12 @@ class ContactTest {
     return nearness(first, second, enough);
   }
 
-  /** All pairs [first, second, point] that touch at a configuration. */
+  /** All pairs [first, second, point, pair] that touch at a configuration. */
   at(configuration) {
     const poses = this.kinematics.poses(configuration);
     return this.pairs.flatMap((bodies, pair) => {
       const { apart, point } = this.apart(pair, poses, CLOSE);
-      return apart <= CLOSE ? [[...bodies, point]] : [];
+      return apart <= CLOSE ? [[...bodies, point, pair]] : [];
     });
   }
 
@@ -197,13 +198,13 @@ class ContactTest {
 
   pairInMotion(pair, start, moves, begun) {
     const way = this.way(pair, moves);
-    for (let share = 0, poses = begun; share <= 1 && way > 0; ) {
+    for (let share = 0, asked = 0, poses = begun; share <= 1 && way > 0; asked++) {
       const left = way * (1 - share) + TOUCHING;
       const { apart, point } = this.apart(pair, poses, left);
       if (apart > left) {
         return null;
       }
-      if (apart < TOUCHING + TOLD_APART) {
+      if (apart < TOUCHING + TOLD_APART || asked === MOST_ASKED) { // of which it cannot be told apart
         return { share, pair, point };
       }
       share += (apart - TOUCHING) / way;

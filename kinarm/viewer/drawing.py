@@ -1,7 +1,6 @@
 """Draw an arm and its scene into a Meshcat window, for pages and live."""
 
 import struct
-from collections import defaultdict
 from collections.abc import Mapping
 from dataclasses import replace
 from itertools import count
@@ -36,7 +35,7 @@ from kinarm.viewer.parts import (
     grid_lines,
     obstacle_meshes,
 )
-from kinarm.viewer.visual_shapes import arm_parts
+from kinarm.viewer.visual_shapes import grouped_parts
 
 FLOOR = Finish(0xE9ECEF, roughness=0.95)
 OBSTACLE = Finish(0xB4BCC6, roughness=0.8)
@@ -193,10 +192,7 @@ def draw_arm(window: Visualizer, arm: Arm) -> list[Visualizer]:
     frames = [window]
     for number in range(1, arm.n_joints + 1):
         frames.append(frames[-1][f"axis_{number}"])
-    surfaces: dict[tuple[int, Finish], list[Mesh]] = defaultdict(list)
-    for part in arm_parts(arm):
-        surfaces[part.joint, part.finish].append(part.mesh)
-    for index, ((joint, finish), meshes) in enumerate(surfaces.items()):
+    for index, ((joint, finish), meshes) in enumerate(grouped_parts(arm).items()):
         put(frames[joint][f"part_{index}"], finish, *meshes)
     return frames
 

@@ -139,6 +139,7 @@ async function start(make) {
     element("message").hidden = true;
     document.body.dataset.ready = "";
   } catch (error) {
+    element("card").hidden = element("dock").hidden = true;
     element("message").textContent = `This browser cannot show the page, which needs WebGL and gzip streams: ${error.message}`;
     throw error;
   }

@@ -15,7 +15,7 @@ class Playground extends Controls {
     if (!(this.simulator.selfTest() < ACCURACY)) {
       throw new Error("it does not compute as kinarm does");
     }
-    Object.assign(this, { trial: 0, speed: 0.5, turning: false });
+    Object.assign(this, { trial: 0, speed: Number(element("speed").value), turning: false });
     this.simulator.servo = this.simulator.servos.find(({ hertz }) => hertz === data.plant.servo);
     Object.assign(this.simulator, { delay: data.plant.delay, shield: data.shield });
     this.fill();
@@ -34,11 +34,18 @@ class Playground extends Controls {
     for (let delay = 0; delay <= Math.max(2, data.plant.delay); delay++) {
       option("delay", delay, delay ? count(delay, "step") : "none", delay === data.plant.delay);
     }
-    const choose = (id, change) => element(id).addEventListener("change", () => {
-      change(Number(element(id).value));
-      element(id).blur(); // so that keys are the page's
-      this.restart();
-    });
+    const choose = (id, change) => {
+      let pointed = false;
+      element(id).addEventListener("pointerdown", () => { pointed = true; });
+      element(id).addEventListener("keydown", () => { pointed = false; });
+      element(id).addEventListener("change", () => {
+        change(Number(element(id).value));
+        if (pointed) {
+          element(id).blur(); // so that keys are the page's
+        }
+        this.restart();
+      });
+    };
     choose("policy", (k) => { simulator.policy = simulator.policies[k]; });
     choose("servo", (k) => { simulator.servo = simulator.servos[k]; });
     choose("delay", (steps) => { simulator.delay = steps; });
@@ -92,8 +99,7 @@ class Playground extends Controls {
     Object.assign(this, { way: [state.tool], replaced: 0, begun: state.q, solution: undefined, moved: performance.now() });
     const [touching] = simulator.contact.at(state.q);
     if (touching) { // an obstacle was pushed into the arm
-      const pair = this.data.pairs.findIndex(([first, second]) => first === touching[0] && second === touching[1]);
-      Object.assign(state, { outcome: "collision", touched: { pair, point: touching[2] } });
+      Object.assign(state, { outcome: "collision", touched: { pair: touching[3], point: touching[2] } });
     }
     this.show();
   }
@@ -174,12 +180,12 @@ class Playground extends Controls {
   verdict(outcome) {
     const { state, data, simulator: { task } } = this;
     const steps = count(state.steps, "step");
-    const names = (found) => data.pairs[found.pair].map((body) => data.bodies[body].name);
+    const names = ({ pair }, word) => (pair === null ? "not proven free" : data.pairs[pair].map((body) => data.bodies[body].name).join(word));
     return {
       success: `within ${metres(task.tolerance)} after ${steps}`,
-      collision: state.touched ? `${names(state.touched).join(" touches ")} after ${steps}` : "",
+      collision: state.touched ? `${names(state.touched, " touches ")} after ${steps}` : "",
       truncated: `not there after ${count(task.horizon, "step")}, and goes on`,
-      moving: state.replaced ? names(state.replaced).join(" would touch ") : "",
+      moving: state.replaced ? names(state.replaced, " would touch ") : "",
     }[outcome];
   }
 
@@ -195,18 +201,23 @@ class Playground extends Controls {
         stage.viewer.controls.enabled = false; // else it would turn the view
         area.setPointerCapture(event.pointerId);
         const number = stage.obstacles.indexOf(taken.node);
-        held = { number, follow: stage.follower(taken), goal: this.state.goal, offset: stage.obstacles[number]?.position.toArray(), x: event.clientX, y: event.clientY };
+        held = { id: event.pointerId, number, follow: stage.follower(taken), goal: this.state.goal, offset: stage.obstacles[number]?.position.toArray(), x: event.clientX, y: event.clientY };
       }
     }, true);
     area.addEventListener("pointermove", (event) => {
       if (held) {
-        this.drag(held, event);
+        if (event.pointerId === held.id) {
+          this.drag(held, event);
+        }
       } else {
         area.style.cursor = event.pointerType === "mouse" && !event.buttons && stage.under(event) ? "grab" : "";
       }
     });
     for (const end of ["pointerup", "pointercancel"]) {
-      area.addEventListener(end, () => {
+      area.addEventListener(end, (event) => {
+        if (event.pointerId !== held?.id) {
+          return;
+        }
         held = null;
         stage.viewer.controls.enabled = true;
       }, true);
@@ -215,18 +226,22 @@ class Playground extends Controls {
 
   drag(held, event) {
     const turns = (this.turning || event.shiftKey) && held.number < 0 && this.state.goal.length > 3;
+    const [right, down] = [event.clientX - held.x, event.clientY - held.y];
+    Object.assign(held, { x: event.clientX, y: event.clientY });
     if (turns) {
-      const [right, up] = this.stage.cameraAxes;
-      this.turnGoal(up, TURNING * (event.clientX - held.x));
-      this.turnGoal(right, TURNING * (event.clientY - held.y));
-      Object.assign(held, { x: event.clientX, y: event.clientY });
+      const axes = this.stage.cameraAxes;
+      this.turnGoal(axes[1], TURNING * right);
+      this.turnGoal(axes[0], TURNING * down);
+      // A move that follows goes on from here.
+      Object.assign(held, { goal: this.state.goal, follow: this.stage.follower({ node: this.stage.find("goal"), point: this.stage.goalUnder(event) }) });
       return;
     }
     const moved = held.follow(event);
     if (moved && held.number < 0) {
       this.setGoal(held.goal.map((value, k) => value + (moved[k] ?? 0)));
     } else if (moved) {
-      this.moveObstacle(held.number, held.offset.map((value, k) => value + moved[k]));
+      const far = 2 * this.data.reach;
+      this.moveObstacle(held.number, held.offset.map((value, k) => clamp(value + moved[k], -far, far)));
       this.restart();
     }
   }

@@ -10,7 +10,6 @@ class PlayStage extends Stage {
     super(viewer, data);
     const { THREE } = this;
     this.solution = this.arm.ghost(data, 0x808890, 0.16);
-    this.find("goal").traverse((node) => { node.castShadow = node.castShadow && node.material && !node.material.transparent; });
     this.obstacles = data.obstacles.map((body, k) => this.find("obstacles", String(k)));
     const way = new THREE.BufferAttribute(new Float32Array(3 * MOST_TRAIL), 3);
     this.trail = new THREE.Line(new THREE.BufferGeometry().setAttribute("position", way), new THREE.LineBasicMaterial());
@@ -41,7 +40,8 @@ class PlayStage extends Stage {
     const { touched, replaced } = state;
     this.flashAt(touched?.point);
     const found = touched || replaced;
-    const joints = found ? this.data.pairs[found.pair].map((body) => this.data.bodies[body].joint).filter(Boolean) : [];
+    const bodies = found && found.pair !== null ? this.data.pairs[found.pair] : [];
+    const joints = bodies.map((body) => this.data.bodies[body].joint).filter(Boolean);
     this.glow(joints, touched ? TOUCHED : this.data.colours.replaced);
     this.viewer.set_dirty();
   }
@@ -74,11 +74,17 @@ class PlayStage extends Stage {
     const goal = this.find("goal");
     const centre = goal.getWorldPosition(new THREE.Vector3());
     if (caster.ray.distanceToPoint(centre) < GRASP * this.data.scale * (event.pointerType === "touch" ? 1.6 : 1)) {
-      return { node: goal, point: caster.ray.closestPointToPoint(centre, new THREE.Vector3()) };
+      return { node: goal, point: this.goalUnder(event) };
     }
     const [hit] = caster.intersectObjects([this.arm.root, ...this.obstacles], true);
     const node = hit && this.obstacles.find((obstacle) => hit.object === obstacle || obstacle.getObjectById(hit.object.id));
     return node ? { node, point: hit.point } : null;
+  }
+
+  /** The point nearest to the goal that a pointer points at. */
+  goalUnder(event) {
+    const { Vector3 } = this.THREE;
+    return this.ray(event).ray.closestPointToPoint(this.find("goal").getWorldPosition(new Vector3()), new Vector3());
   }
 
   /** Follow a pointer that has taken something: how far it moved it, in the world [m]. */

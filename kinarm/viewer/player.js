@@ -79,7 +79,7 @@ function drawPlot(trial, frames, colours) {
 class Player extends Controls {
   constructor(stage, data) {
     super(stage, data);
-    this.speed = 0.25;
+    this.speed = Number(element("speed").value);
     const groups = new Map();
     data.trials.forEach((trial, index) => {
       const words = BADGES[trial.runs[0].outcome][0].toLowerCase();

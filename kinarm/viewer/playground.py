@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from kinarm.collision import ContactModel
 from kinarm.episode_plants import EpisodePlants
 from kinarm.errors import InvalidInputError
 from kinarm.kernels.compiling import Array
@@ -57,7 +58,7 @@ def play_page(
     draw_stage(drawn.window, arm, problem)
     data = {
         **arm_data(arm, scene),
-        **contact_data(world.contact_model),
+        **contact_data(ContactModel.build(arm, scene, loose=True)),
         "servos": _servos(world, starts[:1], goals[:1]),
         "shares": shield_table(arm.n_actuated),
         "obstacles": arm.geometry.ngeoms + np.arange(len(scene.obstacles)),

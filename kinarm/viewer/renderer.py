@@ -5,7 +5,6 @@ and a bright room.
 """
 
 import math
-from collections import defaultdict
 from collections.abc import Sequence
 from functools import partial
 from itertools import count
@@ -43,7 +42,7 @@ from kinarm.viewer.parts import (
     to_linear,
     to_srgb,
 )
-from kinarm.viewer.visual_shapes import arm_parts, link_joints
+from kinarm.viewer.visual_shapes import grouped_parts, link_joints
 
 single = partial(np.asarray, dtype=np.float32)
 
@@ -122,9 +121,7 @@ class Renderer:
         placed = scene.bodies[: len(scene.obstacles)]
         self._motions = [body.motion for body in placed if body.motion]
         frames = count(arm.n_joints + 2)
-        groups: dict[tuple[int, Finish], list[Mesh]] = defaultdict(list)
-        for joint, finish, mesh in arm_parts(arm):
-            groups[joint, finish].append(mesh)
+        groups = grouped_parts(arm)
         self._n_arm = len(groups)
         for finish, mesh in [(CUBE, cube_mesh(scene)), *goal_marks(self.problem.task.goal)]:
             groups[arm.n_joints + 1, finish].append(mesh)

@@ -10,12 +10,15 @@ class ReplayStage extends Stage {
     this.start = this.arm.ghost(data, 0x808890, 0.16);
     this.refused = this.arm.ghost(data, data.colours.collision, 0.34);
     this.rival = data.trials.some((trial) => trial.runs.length > 1) ? this.arm.ghost(data, RIVAL, 0.55) : null;
-    this.find("goal").traverse((node) => { node.castShadow = node.castShadow && node.material && !node.material.transparent; });
   }
 
   theme(name) {
     super.theme(name);
     this.start.material.color.copy(this.colour(THEMES[name].ghost));
+    for (const trial of this.find("trials").children) {
+      const random = trial.getObjectByName("random");
+      random?.traverse((mesh) => mesh.material && mesh.material.color.copy(this.colour(THEMES[name].obstacle)));
+    }
   }
 
   select(index) {

@@ -198,7 +198,7 @@ class Simulator {
     let found = this.contact.inMotion(state.q, next.q, before);
     for (let passed = 0; !found && this.shield && this.lags && !this.comesToRest(next, passed); passed++) {
       if (passed === MOST_STOPPING) {
-        return { share: 1, pair: 0 };
+        return { share: 1, pair: null }; // not proven free
       }
       const after = this.moved(next, null);
       found = this.contact.inMotion(next.q, after.q, before);

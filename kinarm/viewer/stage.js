@@ -83,6 +83,7 @@ class Stage {
     this.mesh("flash").material.depthTest = false;
     this.mesh("flash").castShadow = false;
     this.find("floor").traverse((node) => { node.castShadow = false; });
+    this.find("goal").traverse((node) => { node.castShadow = node.castShadow && node.material && !node.material.transparent; });
     this.camera();
   }
 

@@ -28,6 +28,9 @@ class TrialList {
       chip.addEventListener("click", () => {
         select(index);
         this.show(WIDE.matches);
+        if (!WIDE.matches) {
+          element("list").focus(); // the chip is gone with its list
+        }
       });
       rows.get(name).append(chip);
       this.chips.push(chip);

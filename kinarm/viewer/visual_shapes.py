@@ -5,6 +5,7 @@ Meshes are painted, simplified triangles; a file is read once, then cached.
 
 import json
 import logging
+from collections import defaultdict
 from collections.abc import Iterator, Mapping, Sequence
 from functools import cache, lru_cache
 from importlib import metadata
@@ -24,7 +25,7 @@ from kinarm.errors import ArmError, KinarmError, MissingExtraError
 from kinarm.meshes import mesh_content
 from kinarm.urdf_tree import FARTHEST, check_numbers, check_shapes
 from kinarm.viewer.meshes import Mesh, from_coal
-from kinarm.viewer.parts import FINISHES, PLAIN, ArmPart, packed_colour, shape_finish
+from kinarm.viewer.parts import FINISHES, PLAIN, ArmPart, Finish, packed_colour, shape_finish
 
 Element = ElementTree.Element
 
@@ -54,6 +55,14 @@ class PaintedMesh(NamedTuple):
 
     mesh: Mesh
     colour: int | None
+
+
+def grouped_parts(arm: Arm) -> dict[tuple[int, Finish], list[Mesh]]:
+    """Meshes of an arm by joint and finish."""
+    groups: dict[tuple[int, Finish], list[Mesh]] = defaultdict(list)
+    for part in arm_parts(arm):
+        groups[part.joint, part.finish].append(part.mesh)
+    return groups
 
 
 @lru_cache(maxsize=8)

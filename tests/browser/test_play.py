@@ -258,6 +258,16 @@ def test_an_obstacle_is_dragged_along_the_floor_and_touches(watched):
             assert " touches ".join(touching.pair) in watched.page.inner_text("#verdict")
         met.add(touching is None)
     assert met == {True, False}
+    # Where it stands in the scene, shoulder and base are out of its reach.
+    watched.tell("kinarm.moveObstacle(1, [0, -0.65, 0.1])")
+    assert watched.state["outcome"] == "collision"
+    assert "shoulder touches left bench" in watched.page.inner_text("#verdict")
+    arm = world.arm
+    joints = [shape.parentJoint for shape in arm.geometry.geometryObjects]
+    touching = watched.tell("kinarm.contacts(kinarm.state.q)")
+    assert {(0, 1), (1, 1)} <= {
+        (joints[body], obstacle - len(joints)) for body, obstacle, *_ in touching
+    }
 
 
 def test_keys(watched):

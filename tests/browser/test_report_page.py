@@ -156,9 +156,9 @@ def test_page_and_player_go_together(visit):
 
 def test_pointing_at_a_policy_dims_the_others(visit):
     page = visit(**DESKTOP)
-    page.locator("#right .legend li[data-series='ars-tuned-both']").hover()
-    dimmed = page.locator("#right .chart .dimmed").count()
-    shown = page.locator("#right .chart .series:not(.dimmed)").all()
+    page.locator("#problem-right .legend li[data-series='ars-tuned-both']").hover()
+    dimmed = page.locator("#problem-right .chart .dimmed").count()
+    shown = page.locator("#problem-right .chart .series:not(.dimmed)").all()
     assert dimmed > 0
     assert {each.get_attribute("data-series") for each in shown} == {"ars-tuned-both"}
 
@@ -178,17 +178,17 @@ def test_a_tap_tells_what_a_figure_means(visit):
     page = visit(**PHONE)
     tip = page.locator("#tip")
     assert tip.is_hidden()
-    for cell in page.locator("#right td[data-term]:has(.value)").all():
+    for cell in page.locator("#problem-right td[data-term]:has(.value)").all():
         cell.tap()
         assert tip.inner_text() == meaning_of(cell.get_attribute("data-term"))
         assert is_within(page, tip)
-    page.locator("#right h2").tap()
+    page.locator("#problem-right h2").tap()
     assert tip.is_hidden()
 
 
 def test_arrows_go_through_the_goals_of_a_map(visit):
     page = visit(**DESKTOP)
-    tip, first = page.locator("#tip"), page.locator("#right svg.map[tabindex]").first
+    tip, first = page.locator("#tip"), page.locator("#problem-right svg.map[tabindex]").first
     titles = first.locator(":has(> title) > title").all_text_contents()[::-1]
     first.focus()
     for key, index in (("ArrowRight", 0), ("ArrowDown", 1), ("ArrowLeft", 0), ("ArrowUp", -1)):
@@ -210,13 +210,13 @@ def test_the_keyboard_tells_what_every_figure_means(visit, width):
     """Each figure of a table is on the way of the tabulator key, once, wherever it stands."""
     page = visit(viewport={"width": width, "height": 844})
     tip, told = page.locator("#tip"), []
-    page.locator("#right h2").evaluate("h2 => { h2.tabIndex = -1; h2.focus(); }")
+    page.locator("#problem-right h2").evaluate("h2 => { h2.tabIndex = -1; h2.focus(); }")
     focus = "document.activeElement"
-    while page.evaluate(f"{focus}.closest('section')?.id") == "right":
+    while page.evaluate(f"{focus}.closest('section')?.id") == "problem-right":
         if page.evaluate(f"{focus}.classList.contains('term')"):
             told.append(page.evaluate(f"{focus}.textContent"))
             assert tip.inner_text() == meaning_of(told[-1])
             assert is_within(page, tip)
         page.keyboard.press("Tab")
-    cells = page.locator("#right td[data-term]:has(.value)").all()
+    cells = page.locator("#problem-right td[data-term]:has(.value)").all()
     assert sorted(told) == sorted({cell.get_attribute("data-term") for cell in cells})

@@ -45,6 +45,7 @@ function explanation(target) {
 function explain(target) {
   const [element, text] = explanation(target);
   explained = text ? element : null;
+  tip.hidden = !text; // before the text, which else is no change in what is announced
   tip.textContent = text;
   placeTip();
 }
@@ -106,78 +107,93 @@ for (const map of document.querySelectorAll("svg.map[tabindex]")) {
   });
 }
 
-// The replay of the worst trials: a row chooses the trial, and follows when the player goes on.
-const frame = document.querySelector("#worst iframe");
-const rows = [...document.querySelectorAll("tr[data-replay]")];
-let player = null;
-let wanted = null;
+// A replay of worst trials: a row chooses the trial, and follows when the player goes on. Nothing is
+// loaded before it is near, and nothing plays on out of sight.
+class Theatre {
+  constructor(theatre) {
+    this.frame = theatre.querySelector("iframe");
+    this.rows = [...theatre.querySelectorAll("tr[data-replay]")];
+    Object.assign(this, { player: null, wanted: null, near: false });
+    for (const row of this.rows) {
+      row.addEventListener("click", () => this.watch(Number(row.dataset.replay)));
+    }
+    this.frame.addEventListener("load", () => this.frame.srcdoc && this.wait());
+    new IntersectionObserver((entries) => this.pass(entries.at(-1).isIntersecting), { rootMargin: "300px" }).observe(this.frame);
+  }
 
-function mark(index) {
-  for (const row of rows) {
-    row.toggleAttribute("aria-current", Number(row.dataset.replay) === index);
+  mark(index) {
+    for (const row of this.rows) {
+      if (Number(row.dataset.replay) === index) {
+        row.setAttribute("aria-current", "true");
+      } else {
+        row.removeAttribute("aria-current");
+      }
+    }
+  }
+
+  load() {
+    if (!this.frame.srcdoc) {
+      this.frame.srcdoc = this.frame.dataset.page;
+      this.frame.removeAttribute("data-page");
+    }
+  }
+
+  watch(index) {
+    this.wanted = index;
+    this.mark(index);
+    this.load();
+    this.frame.scrollIntoView({ block: "nearest" });
+    if (this.player) {
+      this.player.select(index);
+      this.player.play();
+    }
+  }
+
+  pass(near) {
+    this.near = near;
+    if (near) {
+      this.load();
+    } else if (this.player) {
+      this.player.pause();
+    }
+  }
+
+  shareTheme() {
+    if (this.player && this.player.state.theme !== shownTheme()) {
+      this.frame.contentDocument.getElementById("theme").click();
+    }
+  }
+
+  wait() {
+    const waiting = new MutationObserver(() => {
+      waiting.disconnect();
+      this.join();
+    });
+    waiting.observe(this.frame.contentDocument.body, { attributeFilter: ["data-ready"] });
+    this.join();
+  }
+
+  join() {
+    const inside = this.frame.contentDocument;
+    if (!inside.body || !("ready" in inside.body.dataset)) {
+      return;
+    }
+    this.player = this.frame.contentWindow.kinarm;
+    this.shareTheme();
+    new MutationObserver(() => this.mark(this.player.state.index)).observe(inside.getElementById("spoken"), { childList: true });
+    if (this.wanted !== null) {
+      this.watch(this.wanted);
+      return;
+    }
+    this.mark(this.player.state.index);
+    if (!this.near) {
+      this.player.pause();
+    }
   }
 }
 
-function load() {
-  if (!frame.srcdoc) {
-    frame.srcdoc = frame.dataset.page;
-    frame.removeAttribute("data-page");
-  }
-}
-
-function watch(index) {
-  wanted = index;
-  mark(index);
-  load();
-  frame.scrollIntoView({ block: "nearest" });
-  if (player) {
-    player.select(index);
-    player.play();
-  }
-}
+const theatres = [...document.querySelectorAll(".theatre")].map((each) => new Theatre(each));
 
 function shareTheme() {
-  if (player && player.state.theme !== shownTheme()) {
-    frame.contentDocument.getElementById("theme").click();
-  }
-}
-
-function join() {
-  const inside = frame.contentDocument;
-  if (!inside.body || !("ready" in inside.body.dataset)) {
-    return;
-  }
-  player = frame.contentWindow.kinarm;
-  shareTheme();
-  new MutationObserver(() => mark(player.state.index)).observe(inside.getElementById("spoken"), { childList: true });
-  if (wanted === null) {
-    mark(player.state.index);
-  } else {
-    watch(wanted);
-  }
-}
-
-frame.addEventListener("load", () => {
-  if (!frame.srcdoc) {
-    return;
-  }
-  const waiting = new MutationObserver(() => {
-    waiting.disconnect();
-    join();
-  });
-  waiting.observe(frame.contentDocument.body, { attributeFilter: ["data-ready"] });
-  join();
-});
-
-// Nothing is loaded before it is near, and nothing plays on out of sight.
-new IntersectionObserver(([entry]) => {
-  if (entry.isIntersecting) {
-    load();
-  } else if (player) {
-    player.pause();
-  }
-}, { rootMargin: "300px" }).observe(frame);
-
-for (const row of rows) {
-  row.addEventListener("click", () => watch(Number(row.dataset.replay)));
+  theatres.forEach((each) => each.shareTheme());
 }

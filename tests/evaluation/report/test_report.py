@@ -9,6 +9,7 @@ import pytest
 from drawings import PIXEL
 
 from kinarm.errors import InvalidInputError
+from kinarm.evaluation import EvaluationRequest
 from kinarm.evaluation.report.groups import record_worst, worst_trials
 from kinarm.evaluation.report.page import report_page
 from kinarm.evaluation.report.templating import template_environment
@@ -25,7 +26,9 @@ def text_of(element) -> str:
 
 
 def rows_of(page: str, task: str) -> list[ElementTree.Element]:
-    return content(page).findall(f".//section[@id='{task}']//table[@class='summary']/tbody/tr")
+    return content(page).findall(
+        f".//section[@id='problem-{task}']//table[@class='summary']/tbody/tr"
+    )
 
 
 class TestTable:
@@ -110,3 +113,18 @@ class TestPage:
         twice = [skilled_evaluation, skilled_evaluation]
         with pytest.raises(InvalidInputError, match="two policies are called 'skilled'"):
             report_page(evaluation_document(twice, ""), twice)
+
+
+def test_problems_of_other_scenes_have_a_replay_of_their_own():
+    request = EvaluationRequest(
+        policies=("random",), problems=("right", "left", "post-paper"), trials=3, oracle=False
+    )
+    evaluations = request.evaluate()
+    page = report_page(evaluation_document(evaluations, ""), evaluations)
+    theatres = content(page).findall(".//div[@class='theatre']")
+    captions = [[text_of(each) for each in theatre.iter("caption")] for theatre in theatres]
+    assert captions == [["Problem right", "Problem left"], ["Problem post-paper"]]
+    for theatre in theatres:
+        rows = theatre.findall(".//tr[@data-replay]")
+        assert [row.get("data-replay") for row in rows] == [str(n) for n in range(len(rows))]
+        assert len(theatre.findall(".//iframe")) == 1

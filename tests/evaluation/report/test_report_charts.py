@@ -8,10 +8,12 @@ import numpy as np
 import pytest
 from drawings import PIXEL
 
+from kinarm.bodies import Body
 from kinarm.evaluation.report import charts
 from kinarm.evaluation.report.charts import level
 from kinarm.evaluation.report.templating import template_environment
 from kinarm.evaluation.statistics import share_over_seeds
+from kinarm.scene import PAPER_BENCHES, Obstacle, Scene
 
 
 def drawn(page: str, path: str) -> ElementTree.Element:
@@ -27,7 +29,7 @@ def drawn_map(page: str) -> ElementTree.Element:
 
 def shapes(page: str, name: str, classes: str) -> list[ElementTree.Element]:
     """Shapes that belong to a policy, in the charts of the problem right."""
-    section = drawn(page, ".//section[@id='right']")
+    section = drawn(page, ".//section[@id='problem-right']")
     return section.findall(f".//g[@data-series='{name}']/*[@class='{classes}']")
 
 
@@ -111,12 +113,18 @@ class TestMap:
     def test_regions_obstacles_and_base_are_to_scale(self, page, right):
         drawn = drawn_map(page)
         (region,), view = right.goal_regions, charts.View.of(right.goal_regions)
-        rects, base = drawn.findall("rect"), drawn.find("circle")
-        assert [rect.find("title").text for rect in rects] == [
-            "obstacle: right bench",
-            "region: right",
-        ]
-        rect = rects[1]
+        (rect,), base = drawn.findall("rect"), drawn.find("circle")
+        (bench,) = drawn.findall("polygon")
+        assert bench.find("title").text == "obstacle: right bench"
+        assert rect.find("title").text == "region: right"
+        places = [tuple(map(float, place.split(","))) for place in bench.get("points").split()]
+        (obstacle,) = (each for each in PAPER_BENCHES if each.name == "right bench")
+        ends = np.array([obstacle.lower[:2], obstacle.upper[:2]])
+        across = (view.y[1] - ends[:, 1]) * charts.SCALE
+        down = (view.x[1] - ends[:, 0]) * charts.SCALE
+        for number, scaled in enumerate((across, down)):
+            found = sorted({place[number] for place in places})
+            assert found == pytest.approx(sorted(scaled), abs=PIXEL)
         assert float(rect.get("width")) == pytest.approx(
             (region.upper[1] - region.lower[1]) * charts.SCALE
         )
@@ -135,3 +143,18 @@ class TestMap:
     )
     def test_colours_double_in_distance(self, distance, expected):
         assert level(distance, 0.05) == expected
+
+
+def test_maps_show_bodies_of_every_shape_as_they_stand():
+    ball = Body(name="ball", shape="sphere", size=(0.1,), position=(0.3, 0.2, 0.4))
+    wall = Body(name="wall", shape="halfspace", position=(0.0, 0.9, 0.0), rpy=(np.pi / 2, 0, 0))
+    far = Body(name="far", shape="sphere", size=(0.1,), position=(9.0, 0.0, 0.0))
+    box = Obstacle(name="box", lower=(0.4, -0.1, 0), upper=(0.6, 0.1, 0.5), yaw=np.pi / 4)
+    view = charts.View((-1.0, 1.0), (-1.0, 1.0))
+    found = dict(charts.footprints(Scene(obstacles=(ball, wall, far, box)), view))
+    assert set(found) == {"ball", "box"}
+    corners = np.array([0.5, 0]) + 0.1 * np.sqrt(2) * np.array([[1, 0], [0, 1], [-1, 0], [0, -1]])
+    for corner in corners:
+        assert np.abs(np.array(found["box"]) - corner).max(axis=1).min() < 1e-9
+    distances = np.linalg.norm(np.array(found["ball"]) - (0.3, 0.2), axis=1)
+    np.testing.assert_allclose(distances, 0.1, atol=1e-3)
