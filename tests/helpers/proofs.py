@@ -61,7 +61,8 @@ def assert_identical(first, second, rows=slice(None)):
 def replayed(simulator, start, goal, actions):
     """A motion of the oracle, as the slow reference runs it: at four configurations a step."""
     simulator, left = changed(simulator, tested_configurations=4), iter(actions)
-    return ReferenceSimulator(simulator).rollout(lambda _: next(left), start, goal)
+    reference = ReferenceSimulator(simulator)
+    return reference.rollout(lambda _: next(left), start, goal, observed=False)
 
 
 def assert_reference_agrees(oracle, starts, goals, known):

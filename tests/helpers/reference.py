@@ -92,7 +92,12 @@ class ReferenceSimulator:
         self._begin(simulator.world)
 
     def rollout(
-        self, policy: Callable[[Array], ArrayLike], start: Array, goal: Array
+        self,
+        policy: Callable[[Array], ArrayLike],
+        start: Array,
+        goal: Array,
+        *,
+        observed: bool = True,
     ) -> ReferenceEpisode:
         """Run one episode.
 
@@ -103,6 +108,8 @@ class ReferenceSimulator:
             (n_actions,).
         start, goal : ndarray, shape (n_joints,) and (goal_width,)
             Start configuration [rad or m] and first goal.
+        observed : bool
+            Whether the policy needs observations, which take most of the time.
         """
         self._begin(self._world.in_scene(start, goal))
         begun = self.contact_model.shapes.placed[list(self._problem.scene.moving), 13:]
@@ -115,9 +122,11 @@ class ReferenceSimulator:
         if spec.speed is not None:
             limit = spec.speed * self._problem.stepping.time_step
         joints, aim = ReferencePlant(self._world, q, goal), self._goal_at(goals, 0, 0)
-        _, distance, turn, tool = self.observe(q, aim)
+        distance, turn, tool = self.measure(q, aim)
         seen = joints.seen(q, aim, 0)
-        observation = self.observe(*seen, Moment(q, joints.commanded(q), seen[0]))[0]
+        observation = np.zeros(0)
+        if observed:
+            observation = self.observe(*seen, Moment(q, joints.commanded(q), seen[0]))
         path, observations = [q], [observation]
         rewards: list[float] = []
         success, contact = False, None
@@ -128,7 +137,7 @@ class ReferenceSimulator:
             before, turned, arrived = distance, turn, False
             if contact is None:
                 q, aim = target, self._goal_at(goals, len(rewards) + 1, reached)
-                last, (_, distance, turn, tool) = tool, self.observe(q, aim)
+                last, (distance, turn, tool) = tool, self.measure(q, aim)
                 within = distance <= self.task.tolerance and turn <= spec.rotation_tolerance
                 held = held + 1 if within and np.linalg.norm(tool - last) <= limit else 0
                 arrived = held >= spec.hold
@@ -145,12 +154,12 @@ class ReferenceSimulator:
                 success = reached == spec.sequence
                 if not success:
                     aim = self._goal_at(goals, len(rewards), reached)
-                    _, distance, turn, tool = self.observe(q, aim)
-            if contact is None:
+                    distance, turn, tool = self.measure(q, aim)
+            if contact is None and observed:
                 before_it, now = seen[0], len(rewards)
                 seen, commanded = joints.seen(q, aim, now), joints.commanded(q)
                 moment = Moment(q, commanded, before_it, action, now, observation)
-                observation = self.observe(*seen, moment)[0]
+                observation = self.observe(*seen, moment)
             path.append(q)
             observations.append(observation)
         return ReferenceEpisode(
@@ -179,10 +188,21 @@ class ReferenceSimulator:
         self._geometry = self.contact_model.geometry.clone()
         self._geometry_data = make_verdicts_reliable(self._geometry.createData())
 
-    def observe(
-        self, q: Array, goal: Array, moment: Moment | None = None
-    ) -> tuple[Array, float, float, Array]:
-        """Observation of a configuration, errors of position [m] and rest, and the tool point.
+    def measure(self, q: Array, goal: Array) -> tuple[float, float, Array]:
+        """Errors of position [m] and rest at a configuration, and the tool point."""
+        pose = self._tool_at(q)
+        tool = np.array(pose.translation)
+        turn = self._turn(q, pose.rotation, goal[3:])[1]
+        return float(np.linalg.norm(goal[:3] - tool)), turn, tool
+
+    def _tool_at(self, q: Array) -> pin.SE3:
+        """Pose of the tool."""
+        model, data = self.arm.model, self._data
+        pin.framesForwardKinematics(model, data, q)
+        return data.oMf[model.getFrameId(self.arm.tool_frame, pin.FrameType.BODY)]
+
+    def observe(self, q: Array, goal: Array, moment: Moment | None = None) -> Array:
+        """Observation of a configuration.
 
         All parts but ``proximity``, whose planes only kernels find, are computed anew.
 
@@ -194,13 +214,11 @@ class ReferenceSimulator:
             What else is seen; by default at the start of an episode there.
         """
         now = moment or Moment(q, q, q)
-        model, data = self.arm.model, self._data
-        pin.framesForwardKinematics(model, data, q)
-        pose = data.oMf[model.getFrameId(self.arm.tool_frame, pin.FrameType.BODY)]
+        pose, data = self._tool_at(q), self._data
         tool, rest = np.array(pose.translation), goal[3:]
         offset = goal[:3] - tool
-        positions = [data.oMi[i].translation for i in range(1, model.njoints)]
-        error, turn = self._turn(q, pose.rotation, rest)
+        positions = [data.oMi[i].translation for i in range(1, self.arm.model.njoints)]
+        error, _ = self._turn(q, pose.rotation, rest)
         limit, layout = self._world.rules.step_limit, self._there.layout
         formulas: dict[str, Callable[[], Any]] = {
             "goal": lambda: goal[:3],
@@ -222,8 +240,7 @@ class ReferenceSimulator:
         near = layout.places.get("proximity")
         seen = np.concatenate([np.ravel(formulas[part.name]()) for part in layout.parts])
         earlier = np.tile(seen, layout.history) if now.earlier is None else now.earlier
-        observation = np.concatenate([seen, earlier[: layout.size - layout.width]])
-        return observation, float(np.linalg.norm(offset)), turn, tool
+        return np.concatenate([seen, earlier[: layout.size - layout.width]])
 
     def _nearest(self, tool: Array, slots: int) -> Array:
         """Boxes around the bodies that are nearest to the tool point, shape (slots, 12)."""

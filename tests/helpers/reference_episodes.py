@@ -48,6 +48,7 @@ def compare_actions(simulator, seed, count, held=6, tested=4):
     rollouts = simulator.rollout_actions(actions, starts, goals, record=True)
     reference = ReferenceSimulator(simulator)
     for i in range(count):
-        episode = reference.rollout(scripted(actions[i]), starts[i], goals[i])
+        scenario = starts[i], goals[i]
+        episode = reference.rollout(scripted(actions[i]), *scenario, observed=False)
         assert_equal_outcome(simulator, rollouts, i, episode)
     return np.array([rollouts.success.sum(), rollouts.collision.sum(), count])
