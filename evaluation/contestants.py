@@ -1,7 +1,6 @@
 """Contestants of an evaluation: trained policies and baselines."""
 
 import inspect
-import sys
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
@@ -24,9 +23,7 @@ from kinarm.policies.library import group_of
 from kinarm.policies.policy import Policy
 from kinarm.policies.provenance import normalization_remark
 from kinarm.problem import PROBLEMS, ReachProblem
-
-NEVER = sys.float_info.min
-"""A tolerance that nothing meets [m]."""
+from kinarm.task import NEVER
 
 SHIELDED = "+shield"
 """What the name of a shielded contestant has more."""

@@ -154,6 +154,8 @@ def _model_contestant(
 
 def _imported(name: str, kind: str) -> Any:
     """What ``module:name`` is, perhaps of the current directory; ``kind`` is for messages."""
+    if not IMPORT_PATH.fullmatch(name):
+        raise InvalidInputError(f"{kind} must be module:function, got {name!r}")
     module_name, _, attribute = name.partition(":")
     look_here()
     import_module("kinarm.envs")  # the module may make one by its id

@@ -60,7 +60,7 @@ def select_pairs(request: "EvaluationRequest") -> list[Pair]:
 
 
 def _named_problems(request: "EvaluationRequest") -> list[ReachProblem]:
-    names = (request.problem, *request.problems) if request.problem else request.problems
+    names = request.problems if request.problem is None else (request.problem, *request.problems)
     if not names and request.task is not None:
         return [request.resolve()]
     problems = (replace(request, problem=name).resolve() for name in names)

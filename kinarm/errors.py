@@ -98,7 +98,8 @@ def meant(given: str, available: Iterable[str]) -> str:
     """Suggest the most similar of the available names, if one is similar."""
     from difflib import get_close_matches
 
-    similar = get_close_matches(given, list(available), 1)
+    names = [name for name in available if "/" not in name]  # the others stand for paths
+    similar = get_close_matches(given, names, 1)
     return f" (did you mean {similar[0]!r}?)" if similar else ""
 
 

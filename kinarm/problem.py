@@ -147,7 +147,7 @@ class ReachProblem(Checked):
                 given[name] = replace(own, **of_part)
         for part, whole in (("task", task), ("stepping", self.stepping), ("plant", self.plant)):
             whole = changes.get(part, whole)
-            if own := _taken(given, type(whole)):
+            if own := _taken(given, type(getattr(self, part))):
                 changes[part] = replace(whole, **own)
         _check_names("setting of a problem", given, ReachProblem, ReachTask, Stepping, Plant)
         return replace(self, **changes)

@@ -89,7 +89,7 @@ class ProblemOptions(Checked):
         named = changed.pop("problem")
         if named is None and self.task is not None:
             named = changed.pop("task")
-        problem = ReachProblem.load(named or default)
+        problem = ReachProblem.load(default if named is None else named)
         for name in ("arm", "tool_frame", "package_dirs"):
             del changed[name]
         changed["shield"] = (self.shield and not self.SHIELDS_POLICIES) or None

@@ -3,6 +3,7 @@
 Numbers out of range are an `InvalidInputError`, what does not match is a `ProblemError`.
 """
 
+import sys
 from dataclasses import dataclass, field, fields
 from functools import cached_property
 
@@ -16,6 +17,9 @@ from kinarm.scene import Scene
 
 LONGEST_HORIZON = 1_000_000
 """Largest number of steps of an episode: memory grows with it."""
+
+NEVER = sys.float_info.min
+"""A tolerance that nothing meets, not even what is exactly there [m]."""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -32,6 +32,7 @@ from kinarm.problem import ProblemLike, ReachProblem
 from kinarm.scene_draws import SceneDraws
 from kinarm.shield import shield_table
 from kinarm.step_contact import StepContact
+from kinarm.task import NEVER
 
 
 class World(GoalKinematics, StepContact):
@@ -82,7 +83,7 @@ class World(GoalKinematics, StepContact):
         self.rules = Rules(
             step_limit=self.arm.velocity_limits[: self.arm.n_actuated] * stepping.time_step,
             tested=stepping.tested_configurations,
-            tolerance=float(task.tolerance),
+            tolerance=float(task.tolerance) if task.tolerance > NEVER else -1.0,
             horizon=int(task.horizon),
             reward=task.reward.vector,
             moves=self.problem.body_offsets(np.arange(task.horizon + 1)),

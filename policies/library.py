@@ -59,7 +59,7 @@ def policy_files(name_or_file: str | Path) -> tuple[Path, ...]:
     files = tuple(file for name, file in shipped if text in (name, group_of(name)))
     if files:
         return files
-    if is_folder(path):
+    if text and is_folder(path):
         if not (found := _in_order(path.glob("*.npz"))):
             raise InvalidInputError(f"there is no policy (.npz) in the folder {str(path)!r}")
         return tuple(found)

@@ -148,7 +148,7 @@ def _adapted(config: ConfigT, special: Mapping[tuple[str, str], Mapping[str, Any
         config = replace(config, **special.get((config.recipe, condition), {}))
     scale = problem.task.tolerance / PROBLEMS["right"].task.tolerance
     if (length := getattr(config, "training_tolerance", None)) is not None:
-        changes["training_tolerance"] = round(scale * length, 9)
+        changes["training_tolerance"] = round(scale * length, 9) or scale * length
     weights = config.training_problem.task.reward
     relative = round(problem.load_arm().reach / RECIPE_REACH, 2)
     changes["reward"] = replace(weights, progress=weights.progress / relative)

@@ -11,11 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kinarm import Plant, Simulator, World
-from kinarm.evaluation.contestants import NEVER
 from kinarm.kernels.plant import COMMAND
 from kinarm.policies import Policy, export_policy
 from kinarm.policies.arm_policy import ArmPolicy
 from kinarm.policies.running.mujoco_arm import SUBSTEP, servo_model
+from kinarm.task import NEVER
 
 Array = NDArray[np.float64]
 

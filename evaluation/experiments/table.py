@@ -151,7 +151,7 @@ def shown(value: Any) -> str:
     if isinstance(value, float):
         return f"{value:g}"
     if isinstance(value, list | tuple):
-        return "-".join(map(shown, value))
+        return "-".join(map(shown, value)) or "none"
     return str(value)
 
 

@@ -1,7 +1,5 @@
 """A fake arm, which obeys as a plant does."""
 
-import sys
-
 import numpy as np
 
 from kinarm.episodes import RUNNING
@@ -12,7 +10,7 @@ from kinarm.observation_choice import Observation
 from kinarm.plant import Plant, PlantLike
 from kinarm.policies.running.backend import SimulatedArm
 from kinarm.simulator import Simulator
-from kinarm.task import LONGEST_HORIZON
+from kinarm.task import LONGEST_HORIZON, NEVER, RewardWeights
 from kinarm.world import World
 
 FAR = 1e3
@@ -47,7 +45,8 @@ class FakeArm(SimulatedArm):
                 shield=False,
                 time_step=period,
                 horizon=LONGEST_HORIZON,
-                tolerance=sys.float_info.min,
+                tolerance=NEVER,
+                reward=RewardWeights(),
                 goal=GoalSpecification(),
                 observation=Observation(),
             )

@@ -13,6 +13,7 @@ from kinarm.evaluation.evaluation import run_trials
 from kinarm.evaluation.finding import find_contestants
 from kinarm.evaluation.metrics import CLOSE, HOLDING_WITHIN
 from kinarm.evaluation.outcomes import HOLDING_STEPS, Holding
+from kinarm.policies import load_policy
 
 
 @pytest.fixture(scope="module")
@@ -90,6 +91,15 @@ def test_the_oracle_aims_closer_and_stays(trials):
     assert (held.closest <= AIM + 1e-9).all()
     assert (held.farthest_at_end <= AIM + 1e-9).all()
     assert not held.collision.any()
+
+
+def test_what_is_exactly_there_goes_on_as_well(trials):
+    """Inverse kinematics brings joints to within rounding of a goal, and often onto it."""
+    contestant = Contestant.from_policy("best", load_policy("ppo-best-both-seed0"))
+    held = measure_holding(contestant, trials)
+    assert (held.steps == trials.problem.task.horizon)[~held.collision].all()
+    assert np.isfinite(held.farthest_at_end[~held.collision]).all()
+    assert (held.closest == 0.0).any()
 
 
 def test_a_policy_that_does_not_move_stays_where_it_is(trials):
