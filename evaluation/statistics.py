@@ -47,8 +47,8 @@ class Estimate:
         return share_over_seeds(hits[None])
 
     def __str__(self) -> str:
-        interval = " ({:.3g}..{:.3g})".format(*self.ci95) if self.ci95 else ""
-        return "unknown" if self.value is None else f"{self.value:.3g}{interval}"
+        interval = " ({:.3f}..{:.3f})".format(*self.ci95) if self.ci95 else ""
+        return "not measurable" if self.value is None else f"{self.value:.3f}{interval}"
 
     def to_json(self) -> dict[str, Any]:
         """As a dictionary that JSON can hold."""
