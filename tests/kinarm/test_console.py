@@ -20,7 +20,8 @@ def fresh_terminal(monkeypatch):
     return error
 
 
-def test_what_is_compiled_is_said_once(monkeypatch):
+def test_what_is_compiled_is_said_once(monkeypatch, tmp_path):
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))  # where nothing lies from an earlier run
     error = fresh_terminal(monkeypatch)
 
     @kernel
