@@ -140,9 +140,9 @@ class ContactModel:
         for pair in candidates:
             geometry.addCollisionPair(pin.CollisionPair(*pair))
         names = (*body_names(arm), *surroundings)
-        random = range(fixed, fixed + sum(each.count[1] for each in scene.random_bodies))
-        random = range(n_shapes, random.stop) if loose else random
-        dropped = uninformative_pairs(arm, geometry, n_shapes, names, random)
+        last = fixed + sum(each.count[1] for each in scene.random_bodies)
+        anywhere = range(n_shapes if loose else fixed, last)
+        dropped = uninformative_pairs(arm, geometry, n_shapes, names, anywhere)
         kept = [pair for index, pair in enumerate(candidates) if index not in dropped]
         geometry.removeAllCollisionPairs()
         for pair in kept:

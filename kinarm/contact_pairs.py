@@ -100,12 +100,12 @@ def uninformative_pairs(
     geometry: pin.GeometryModel,
     n_shapes: int,
     names: tuple[str, ...],
-    random: range,
+    anywhere: range,
 ) -> dict[int, str]:
     """Pairs within the arm that touch at home, and of the mounting, with reasons.
 
     The mounting is the first link against the world, where it touches never, or the ground always,
-    at 721 positions along the range of the first joint. Random bodies may be anywhere.
+    at 721 positions along the range of the first joint. Some bodies may be anywhere.
     """
     data, geometry_data = arm.model.createData(), make_verdicts_reliable(geometry.createData())
     pairs, objects = list(geometry.collisionPairs), geometry.geometryObjects
@@ -121,7 +121,7 @@ def uninformative_pairs(
     mounting = {
         index
         for index, pair in enumerate(pairs)
-        if pair.second >= n_shapes and pair.second not in random
+        if pair.second >= n_shapes and pair.second not in anywhere
         if objects[pair.first].parentJoint == 1
     }
     always, never = set(mounting), set(mounting)

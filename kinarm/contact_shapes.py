@@ -54,7 +54,7 @@ class ContactShapes(NamedTuple):
         minus infinity unless they are exact.
     pairs : ndarray of int, shape (n_pairs, 3)
         Kind, index of a moving shape of the arm, and index of the other shape.
-    travel : ndarray, shape (n_actuated, n_pairs)
+    travel : ndarray, shape (n_joints, n_pairs)
         Bound on how far a joint moves the bodies of a pair relative to each
         other [m/rad, or m/m].
     exact : ndarray of bool, shape (n_shapes,)
@@ -81,7 +81,7 @@ class ContactShapes(NamedTuple):
     proxies : ndarray of int, shape (n_pairs, 2, 2)
         Bodies that stand for these two: in every step, and where it is close.
     farthest : ndarray, shape (n_actuated,)
-        Largest entry of each row of ``travel``.
+        Largest entry of each of these rows of ``travel``.
     placed : ndarray, shape (n_placed, POSE)
         Rows in ``poses`` of the scene's bodies: size x, y, z and rounding [m],
         rotation matrix, position [m].

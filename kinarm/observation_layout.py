@@ -55,6 +55,15 @@ class ObservationLayout(NamedTuple):
         counts = {ONCE: 1, JOINTS: n_joints, ACTUATED: n_actuated, SLOTS: chosen.obstacle_slots}
         return cls(parts, counts, chosen.history)
 
+    @classmethod
+    def filling(cls, problem: ReachProblem, size: int, n_actuated: int) -> "ObservationLayout":
+        """The layout for the fewest joints that fill so many entries, as of a policy's mean."""
+        for n_joints in range(1, size + 1):
+            layout = cls.sized(problem, n_joints, n_actuated)
+            if layout.size >= size:
+                return layout
+        raise InvalidInputError(f"mean has {size} values, its observation has fewer")
+
     def length(self, part: Part) -> int:
         """Number of entries of a part in the observation of a step."""
         return len(part.signs) * self.counts[part.of]

@@ -123,11 +123,7 @@ class Policy:
     @property
     def layout(self) -> ObservationLayout:
         """Where the parts of an observation are."""
-        for n_joints in range(1, self.n_observations + 1):
-            layout = ObservationLayout.sized(self.problem, n_joints, self.n_actions)
-            if layout.size >= self.n_observations:
-                return layout
-        raise InvalidInputError(f"mean has {self.n_observations} values, its observation has fewer")
+        return ObservationLayout.filling(self.problem, self.n_observations, self.n_actions)
 
     @property
     def n_actions(self) -> int:

@@ -161,7 +161,7 @@ class ArmEnvironment:
             q, goals = self._episodes.q, self._episodes.goal
         fixed = fixed_scenario(options, self.simulator, self._n_arms)
         if fixed:  # refuse what cannot be, before anything changes
-            starts, ends = (fixed.get(*each)[rows] for each in (("start", q), ("goal", goals)))
+            starts, ends = fixed.get("start", q)[rows], fixed.get("goal", goals)[rows]
             if "start" in fixed:
                 self.simulator.reset(starts, ends)
             else:
