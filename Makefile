@@ -45,8 +45,9 @@ lint: $(call INSTALLED,dev) ## check style, format and types
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 
+# Most of the time goes into what a few pages run: four at a time, they share two cores evenly.
 docs: $(call INSTALLED,docs) ## build the site into docs/_build/html
-	$(BIN)/sphinx-build -n -W --keep-going --jobs auto -b html docs docs/_build/html
+	$(BIN)/sphinx-build -n -W --keep-going --jobs 4 -b html docs docs/_build/html
 
 PYTHONS ?= python3.11 python3.12 python3.13
 

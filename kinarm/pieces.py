@@ -67,7 +67,7 @@ def _with_best_cut(triangles: Array) -> Part:
 def _hull_volume(triangles: Array) -> float:
     """Volume of the convex hull of triangles [m^3], infinite if it is flat."""
     try:
-        volume = ConvexHull(np.unique(triangles.reshape(-1, 3), axis=0)).volume
+        volume = ConvexHull(triangles.reshape(-1, 3)).volume
     except (QhullError, ValueError):
         return np.inf
     return float(volume) if volume > 1e-12 else np.inf

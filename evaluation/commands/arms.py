@@ -11,10 +11,10 @@ from kinarm._tables import print_table
 from kinarm.arm_specification import PACKAGE, ArmFile, arm_names
 
 HEADINGS = (
-    *("arm", "title", "joints", "actuated", "reach [m]", "speeds [deg/s]", "pairs"),
+    *("arm", "title", "joints", "actuated", "reach [m]", "speeds [deg/s]"),
     *("licence", "source", "installed"),
 )
-EXPENDABLE = ("source", "licence", "speeds [deg/s]", "pairs", "actuated", "joints", "title")
+EXPENDABLE = ("source", "licence", "speeds [deg/s]", "actuated", "joints", "title")
 """Columns that narrow terminals leave out, in this order."""
 
 
@@ -25,18 +25,16 @@ class ListRequest:
     def rows(self) -> list[tuple[str, ...]]:
         """A row for each arm, under `HEADINGS`; partly empty if not installed."""
         from kinarm.arm import Arm
-        from kinarm.contact_statistics import contact_on_bare_ground
         from kinarm.errors import ArmError
         from kinarm.evaluation.arm_facts import joint_speeds
 
         rows = []
         for name in arm_names():
-            known, installed = [""] * 5, "no"
+            known, installed = [""] * 4, "no"
             with suppress(ArmError):
                 arm = Arm.load(name)
-                known = [str(arm.n_joints), str(arm.n_actuated), f"{arm.reach:.2f}"]
-                pairs = contact_on_bare_ground(arm).pair_names
-                known += [joint_speeds(arm), str(len(pairs))]
+                joints = str(arm.n_joints), str(arm.n_actuated)
+                known = [*joints, f"{arm.reach:.2f}", joint_speeds(arm)]
                 installed = "yes"
             file = cast("ArmFile", ArmFile.of(name))
             rows.append((name, file.title, *known, file.licence, file.origin, installed))

@@ -35,7 +35,7 @@ def test_every_shipped_policy_and_submission_has_rows(recorded):
     assert (recorded["trials"], recorded["seed"]) == (leaderboard.TRIALS, leaderboard.SEED)
 
 
-@pytest.mark.slow
+@pytest.mark.rare
 @pytest.mark.parametrize("problem", PROBLEMS)
 def test_a_shipped_policy_is_measured_again(recorded, problem):
     name = "ppo-best-both-seed9"

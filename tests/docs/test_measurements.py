@@ -152,7 +152,7 @@ class TestPeers:
         monkeypatch.setattr(peers, "BUDGET", 0.0)
         return peers
 
-    @pytest.mark.slow
+    @pytest.mark.rare
     @pytest.mark.filterwarnings("ignore")
     def test_everybody_is_compared_with(self, peers):
         policy = load_policy("ars-tuned-both-seed0")

@@ -41,7 +41,7 @@ def test_an_evaluation(evaluation):
 
 @pytest.mark.parametrize(
     "name",
-    ["right", "pose-ur5", "obstacles-ur5", pytest.param("hard-paper", marks=pytest.mark.slow)],
+    ["right", "pose-ur5", "obstacles-ur5", pytest.param("hard-paper", marks=pytest.mark.rare)],
 )
 def test_an_evaluation_of_other_kinds_of_problems(name):
     problem = ReachProblem.load(name)

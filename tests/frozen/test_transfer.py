@@ -13,7 +13,7 @@ from docs.transfer.document import transfer_document
 from docs.transfer.study import Protocol, TransferStudy
 
 
-@pytest.mark.slow
+@pytest.mark.rare
 def test_a_small_study(tmp_path):
     study = TransferStudy(
         learners=("ars",),

@@ -9,7 +9,7 @@ from kinarm.simulator import Simulator
 
 KNOWN_ARMS = ("ur3", "ur5", "ur10", "panda", "xarm7", "z1", "kinova", "so100", "so101")
 EACH_ARM = [
-    pytest.param(name, marks=[] if name in ("ur5", "panda", "so101") else pytest.mark.slow)
+    pytest.param(name, marks=[] if name in ("ur5", "panda", "so101") else pytest.mark.rare)
     for name in KNOWN_ARMS
 ]
 

@@ -129,7 +129,7 @@ def test_arms_stay_away_from_bodies_that_move(plant):
         assert safe.collision.sum() < 0.6 * bare.collision.sum()
 
 
-@pytest.mark.slow
+@pytest.mark.rare
 def test_hundreds_of_thousands_of_random_steps_touch_nothing():
     simulator = Simulator("right").with_plant("hard").shielded()
     steps = 0

@@ -36,7 +36,7 @@ def read_only_install(tmp_path):
         folder.chmod(0o755)
 
 
-@pytest.mark.slow
+@pytest.mark.rare
 def test_later_processes_find_what_the_first_compiled(read_only_install, tmp_path):
     home = tmp_path / "home"
     chosen = ("NUMBA_CACHE_DIR", "XDG_CACHE_HOME")

@@ -185,7 +185,7 @@ SYMMETRIC_ARMS = {"lrmate200ic_5l", "paper", "paper_flange", "z1"}
 def marks(arm):
     """Arms with meshes have to be installed; that others have no mirror takes longer to find."""
     installed = [INSTALLED] if arm in KNOWN_ARMS else []
-    return installed if arm in SYMMETRIC_ARMS else [*installed, pytest.mark.slow]
+    return installed if arm in SYMMETRIC_ARMS else [*installed, pytest.mark.rare]
 
 
 class TestTransferByReflection:

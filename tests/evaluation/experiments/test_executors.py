@@ -80,7 +80,7 @@ def test_one_at_a_time_tasks_are_done_in_the_given_order():
 
 
 @needs_ray
-@pytest.mark.slow
+@pytest.mark.rare
 @pytest.mark.filterwarnings("ignore")
 def test_a_cluster_does_again_what_lost_workers_had_begun(tmp_path):
     work = partial(kill_own_process_once, tmp_path)

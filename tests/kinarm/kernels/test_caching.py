@@ -91,7 +91,7 @@ def value_of_one(package):
     return call
 
 
-@pytest.mark.slow
+@pytest.mark.rare
 def test_whatever_happens_to_the_files_kernels_work(package, value_of_one):
     """A full disk leaves none; what is cut off is made anew."""
     anew, found = (40.0, False), (40.0, True)
@@ -104,7 +104,7 @@ def test_whatever_happens_to_the_files_kernels_work(package, value_of_one):
     assert [value_of_one(), value_of_one()] == [anew, found]
 
 
-@pytest.mark.slow
+@pytest.mark.rare
 def test_machine_code_is_as_fresh_as_all_that_is_compiled_in(package, value_of_one):
     """Files are changed, one by one; nothing but what changes is compiled anew."""
 

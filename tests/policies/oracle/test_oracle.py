@@ -76,7 +76,7 @@ class TestBounds:
             is_long = oracle.simulator.arm.name != "paper_flange"
             assert share == 1 if is_long else 0.85 < share < 0.98
 
-    @pytest.mark.slow
+    @pytest.mark.rare
     def test_a_thousand_trials_of_the_default_arm(self):
         oracle = Oracle("both")
         known = oracle.solve_batch(*drawn(oracle.simulator, 4, 1000))
