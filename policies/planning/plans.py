@@ -136,11 +136,12 @@ def plan(problem: ProblemLike, start: ArrayLike | None, goal: ArrayLike, **setti
     aim = finite_array("goal", goal, (PARTS.get(wanted.goal_kind, arm.n_joints),))
     place = aim[:3] if wanted.goal_kind in PARTS else arm.tool_position(aim)
     begin = arm.home if start is None else start
-    first = _reaching(world, wanted.start_kind, begin, "start", arm.home, joints)[0]
+    starts = _reaching(world, wanted.start_kind, begin, "start", arm.home, joints)
+    first = _far_enough(Motions(world, wanted.margin), "start", starts)[0]
     world = world.in_scene(first, place)
-    ends = _reaching(world, wanted.goal_kind, aim, "goal", first, joints)
     motions, rng = Motions(world, wanted.margin), np.random.default_rng(wanted.seed)
     _far_enough(motions, "start", first[None])
+    ends = _reaching(world, wanted.goal_kind, aim, "goal", first, joints)
     ends = _far_enough(motions, "goal", ends)
     found = []
     for _ in range(PATHS):
@@ -165,7 +166,11 @@ def plan(problem: ProblemLike, start: ArrayLike | None, goal: ArrayLike, **setti
 
 
 def _far_enough(motions: Motions, what: str, configurations: Array) -> Array:
-    """Configurations that keep the margin; InvalidInputError if none does."""
+    """Configurations that touch nothing and keep the margin; InvalidInputError if none does."""
+    pairs = motions.world.contact_pairs(configurations)
+    if all(pairs):
+        raise InvalidInputError(f"{what} is in contact: {' touches '.join(pairs[0] or ())}")
+    configurations = configurations[[pair is None for pair in pairs]]
     kept = [motions.free_share(q, q) == 1.0 for q in configurations]
     if not any(kept):
         raise InvalidInputError(f"{what} is closer to contact than {motions.margin:g} m")
@@ -190,7 +195,7 @@ def _reaching(
 ) -> Array:
     """Configurations of a kind of start or goal, the nearest one first, shape (k, n_joints).
 
-    None touches anything. For a position alone, only so many joints move.
+    For a position alone, only so many joints move.
     """
     numbers = finite_array(what, given, (PARTS.get(kind, world.arm.n_joints),))
     if kind == "configuration":
@@ -211,7 +216,4 @@ def _reaching(
     if len(found) == 0:
         said = " ".join(map(str, numbers.tolist()))
         raise InvalidInputError(f"{what} is out of reach: no configuration is found for {said}")
-    pairs = world.contact_pairs(found)
-    if all(pairs):
-        raise InvalidInputError(f"{what} is in contact: {' touches '.join(pairs[0] or ())}")
-    return found[[pair is None for pair in pairs]]
+    return found

@@ -141,6 +141,25 @@ def test_random_bodies_are_those_of_the_episode():
         assert planned.recording().outcome == "success"
 
 
+def test_a_start_may_be_any_configuration_that_keeps_the_margin():
+    pose = [-0.316, 0.133, 0.198, 1.127, 0.814, 1.378]  # the nearest one to home is too close
+    margin, world = 0.03, World("both")
+    planned = plan("both", pose, START, start_kind="pose", margin=margin)
+    np.testing.assert_allclose(world.poses(planned.waypoints[0])[:3, 3], pose[:3], atol=1e-6)
+    assert pair_distances(world, dense(planned, 200.0)[1][0]).min() > margin
+    nearest = world.inverse_kinematics(world.poses(planned.waypoints[0]), free=True)
+    assert pair_distances(world, nearest.configurations[:1]).min() < margin
+
+
+def test_random_bodies_that_touch_the_start_are_named():
+    size = {"smallest": (0.4, 0.4, 0.4), "largest": (0.4, 0.4, 0.4)}
+    place = {"lower": (-0.2, -0.2, 0.5), "upper": (0.2, 0.2, 0.9)}
+    box = RandomBodies(name="box", shape="box", count=(1, 1), **size, **place)
+    problem = PROBLEMS["both"].replace(scene=Scene(random_bodies=(box,)))
+    with pytest.raises(InvalidInputError, match="start is in contact: .* touches box 1"):
+        plan(problem, START, END)
+
+
 @pytest.mark.parametrize(
     ("given", "words"),
     [
