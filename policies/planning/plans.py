@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from kinarm._files import write_text
+from kinarm.arm import Arm
 from kinarm.bodies import rotation_matrix
 from kinarm.errors import POSITIVE, InvalidInputError, NoPathError, check_range, finite_array
 from kinarm.kernels.compiling import Array
@@ -178,14 +179,14 @@ def _far_enough(motions: Motions, what: str, configurations: Array) -> Array:
 
 
 def _world_of_all_joints(problem: ReachProblem) -> tuple[World, int]:
-    """The world of a problem, all of whose joints are actuated, and how many were."""
+    """The world of a problem, all of whose joints are actuated, and how many move the tool."""
     moving = [problem.scene.bodies[body].name for body in problem.scene.moving]
     if moving:
         raise InvalidInputError(
             f"a plan knows no time at which it begins, and {', '.join(moving)} of the scene of "
             f"{problem.name} moves"
         )
-    arm = problem.load_arm()
+    arm = Arm.load(replace(problem.arm, actuated=None, digest=None))
     moved = replace(problem.arm, actuated=arm.joint_names, digest=None)
     return World(problem.replace(arm=moved), threads=1), arm.n_actuated
 

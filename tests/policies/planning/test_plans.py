@@ -2,6 +2,7 @@
 
 import csv
 import json
+from dataclasses import replace
 
 import numpy as np
 import pinocchio as pin
@@ -89,6 +90,15 @@ def test_tools_reach_what_they_should(kind, target):
     back = plan("both", target, end, start_kind=kind)
     (pose,) = World("both").poses(back.waypoints[:1])
     np.testing.assert_allclose(pose[:3, 3], target[:3], atol=1e-6)
+
+
+def test_joints_that_tasks_hold_still_bring_the_tool_to_a_position():
+    held = replace(PROBLEMS["both"].arm, actuated=("axis_1", "axis_2", "axis_3"))
+    far = [0.39, -0.79, 0.62]  # where only a bent wrist brings the tool
+    planned = plan(PROBLEMS["both"].replace(arm=held), None, far, goal_kind="position")
+    (pose,) = World("both").poses(planned.waypoints[-1:])
+    np.testing.assert_allclose(pose[:3, 3], far, atol=1e-6)
+    assert planned.waypoints[-1, 5] == 0.0
 
 
 def test_files_hold_the_same_motion(made, tmp_path):
