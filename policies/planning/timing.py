@@ -44,9 +44,9 @@ class Trajectory(NamedTuple):
         return float(self.ends[-1])
 
     def at(self, times: Array, derivative: int = 0) -> Array:
-        """Positions at times, or derivatives of them, shape (k, n_joints)."""
+        """Positions at times, or derivatives of them, shape (k, n_joints); later, it rests."""
         which = np.fmin(np.searchsorted(self.ends, times, side="left"), len(self.ends) - 1)
-        since = times - np.concatenate([[0.0], self.ends])[which]
+        since = np.minimum(times, self.ends[-1]) - np.concatenate([[0.0], self.ends])[which]
         found = np.zeros((len(times), self.coefficients.shape[2]))
         for power in range(4, derivative - 1, -1):
             factor = math.perm(power, derivative)

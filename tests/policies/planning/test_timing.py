@@ -84,6 +84,15 @@ def test_paths_without_length_take_no_time(motions):
         np.testing.assert_array_equal(trajectory.at(np.zeros(1)), np.ones((1, 6)))
 
 
+def test_it_rests_after_its_end(motions):
+    path = polyline(3, 3)
+    trajectory = trajectory_of(path, LIMITS, motions)
+    late = trajectory.duration + np.array([1e-9, 0.01, 5.0])
+    np.testing.assert_allclose(trajectory.at(late), path[[-1] * 3], rtol=0, atol=1e-12)
+    for derivative in (1, 2):
+        np.testing.assert_allclose(trajectory.at(late, derivative), 0, atol=1e-9)
+
+
 def test_repeated_corners_count_for_nothing(motions):
     path = polyline(2, 4)
     once, twice = (trajectory_of(each, LIMITS, motions) for each in (path, path.repeat(2, axis=0)))
