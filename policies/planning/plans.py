@@ -24,8 +24,8 @@ from kinarm.world import World
 PATHS = 4
 """Paths that are planned; the one of the fastest motion counts."""
 
-SOLUTIONS = 64
-"""Configurations that reach a position or pose, at most, before whole turns."""
+LONGEST_STEP = 0.02
+"""Longest step of a recording, in which the arm moves straight [s]."""
 
 DERIVATIVES = ("positions", "velocities", "accelerations")
 
@@ -101,8 +101,9 @@ class Plan:
 
     def recording(self) -> Recording:
         """A recording of it, a state for each time step of the problem, tested once more."""
-        times = self.times(1.0 / self.problem.stepping.time_step)
-        world, states = World(self.problem), self.trajectory.at(times)
+        step = min(self.problem.stepping.time_step, LONGEST_STEP)
+        world = World(self.problem.replace(time_step=step))
+        states = self.trajectory.at(self.times(1.0 / step))
         goal = world.reached(states[-1:])[0]
         goal[:3] = self.goal
         return record_path(world, states, goal=goal, name="plan")
@@ -212,7 +213,6 @@ def _reaching(
             near=near,
             joints=joints if kind == "position" else None,
             turns=True,
-            most=SOLUTIONS,
         ).configurations
     if len(found) == 0:
         said = " ".join(map(str, numbers.tolist()))

@@ -14,6 +14,7 @@ from kinarm.body_motion import BodyMotion
 from kinarm.errors import InvalidInputError, NoPathError
 from kinarm.policies import Plan, plan
 from kinarm.problem import PROBLEMS
+from kinarm.recording import record_path
 from kinarm.scene import PAPER_BENCHES, Obstacle, RandomBodies, Scene
 from kinarm.simulator import Simulator
 from kinarm.world import World
@@ -129,6 +130,14 @@ def test_recordings_are_tested_once_more(made):
     assert recording.outcome == "success"
     np.testing.assert_allclose(recording.states[[0, -1]], [START, END], atol=1e-12)
     assert recording.steps == pytest.approx(made.duration / 0.02, abs=1)
+
+
+def test_recordings_do_not_cut_corners_in_long_steps(walled):
+    planned = plan(walled.replace(time_step=0.1), START, END, seed=3)
+    assert planned.recording().outcome == "success"
+    # With a state for each tenth of a second, the arm would move straight into the wall.
+    coarse = planned.trajectory.at(planned.times(10.0))
+    assert record_path(planned.problem, coarse).outcome == "collision"
 
 
 def test_random_bodies_are_those_of_the_episode():
