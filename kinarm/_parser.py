@@ -1,6 +1,7 @@
 """The parser of command lines: help, one-line errors and version."""
 
 import argparse
+import re
 import textwrap
 from collections.abc import Iterable, Sequence
 from difflib import get_close_matches
@@ -21,6 +22,8 @@ class Parser(argparse.ArgumentParser):
     def __init__(self, **options: Any) -> None:
         super().__init__(formatter_class=HelpFormatter, add_help=False, **options)
         self._optionals.title = "general"
+        # Numbers such as -1e-05, too, are values and no options.
+        self._negative_number_matcher = re.compile(r"-\.?\d")
         self.add_argument("-h", "--help", action="help", help="Show this help and exit")
         self.add_argument(
             "--version",

@@ -150,6 +150,10 @@ class TestOptions:
             "window": (1.0, 2.0),
         }
 
+    @pytest.mark.parametrize("low", ["-1e-05", "-1E3", "-.5e-2", "-2.5"])
+    def test_negative_numbers_are_values(self, low):
+        assert parsed("cake.toml", "--window", low, "2", "--share", low).window == [float(low), 2.0]
+
     def test_help_comes_from_the_docstring(self, capsys, monkeypatch):
         monkeypatch.setenv("COLUMNS", "200")
         with pytest.raises(SystemExit):
