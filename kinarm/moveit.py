@@ -47,7 +47,7 @@ class Entry:
         """The value of a key, which must be there if it has no default."""
         if not isinstance(self.value, Mapping):
             raise self.refusal(f"must be a table, got {self.value!r}")
-        value = self.value.get(key, default)
+        value = default if self.value.get(key) is None else self.value[key]
         if value is None:
             raise self.refusal(f"{key!r} is missing")
         return Entry(value, self.file, f"{self.keys}.{key}".lstrip("."))
@@ -106,6 +106,7 @@ def import_problem(
     tool = np.round(bare.tool_position(goal), 9)
     edge = np.array([1e-6, 1e-6, 0.0])  # a region has an area
     lower, upper = (tool - edge).tolist(), (tool + edge).tolist()
+    obstacles = _obstacles(here)
     held, attached = [*bare.held_bodies], "attached_collision_objects"
     for each in state.each(attached) or here.at("robot_state", {}).each(attached):
         link = str(each.at("link_name"))
@@ -117,7 +118,7 @@ def import_problem(
             arm=replace(arm, held_bodies=tuple(held) or None),
             scene=Scene(
                 ground=False,
-                obstacles=_obstacles(here),
+                obstacles=obstacles,
                 goal_regions=(GoalRegion(name="goal", lower=lower, upper=upper),),
                 mount=mount,
             ),

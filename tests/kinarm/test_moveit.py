@@ -203,6 +203,7 @@ def test_refused_scenes(imported, keys, value, words):
     with pytest.raises(InvalidInputError) as refused:
         imported(changed(SCENE, keys, value))
     assert all(word in str(refused.value) for word in ["scene1.yaml: ", *words]), refused.value
+    assert str(refused.value).count("scene1.yaml") == 1
 
 
 @pytest.mark.parametrize(
@@ -223,6 +224,13 @@ def test_refused_requests(imported, keys, value, words):
     with pytest.raises(InvalidInputError) as refused:
         imported(SCENE, changed(REQUEST, keys, value))
     assert all(word in str(refused.value) for word in ["request1.yaml: ", *words]), refused.value
+
+
+@pytest.mark.parametrize("key", ["fixed_frame_transforms", "robot_state", "world.octomap"])
+def test_keys_without_a_value_count_as_missing(imported, key):
+    scene = yaml.safe_dump(changed(SCENE, key.split("."), "nothing")).replace("nothing", "")
+    problem, _ = imported(scene)
+    assert [body.name for body in problem.scene.obstacles] == ["thing"]
 
 
 @pytest.mark.parametrize("text", ["a: [1", "\t", "[" * 200_000, ""])
