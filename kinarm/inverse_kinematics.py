@@ -179,8 +179,19 @@ class InverseKinematics(ABC):
         start = arm.chain.within_limits("near", start, arm.joint_names)
         for name, each in (("position", position_tolerance), ("rotation", rotation_tolerance)):
             check_range(f"{name}_tolerance", each, NOT_NEGATIVE)
-        search = self._search(axes, start, joints, seeds)._replace(
-            position_tolerance=position_tolerance, rotation_tolerance=rotation_tolerance
+        moved = _moved(arm, axes) if joints is None else joints
+        moved = whole_number("joints", moved, 1, arm.n_joints)
+        isolated = moved <= {0: 3, 1: 5, 3: 6}[len(axes)]
+        search = Search(
+            tool=arm.chain.tool,
+            axes=axes,
+            scale=1.0 / arm.reach,
+            position_tolerance=position_tolerance,
+            rotation_tolerance=rotation_tolerance,
+            near=start,
+            seeds=low_discrepancy_points(whole_number("seeds", seeds, 1), moved),
+            least=LEAST_SEEDS if isolated else 0,
+            separation=ISOLATED_SEPARATION if isolated else CONTINUUM_SEPARATION,
         )
         configurations, owner = self._solutions(search, positions, wanted, most)
         if best:
@@ -192,11 +203,11 @@ class InverseKinematics(ABC):
             kept = ~self.in_contact(configurations)
             configurations, owner = configurations[kept], owner[kept]
         if turns:
-            configurations, owner = _turned(arm, configurations, owner, search.seeds.shape[1])
+            configurations, owner = _turned(arm, configurations, owner, moved)
         order = np.lexsort((np.abs(configurations - start).max(axis=1, initial=0.0), owner))
         configurations, owner = configurations[order], owner[order]
         errors = self._errors(axes, configurations, positions[owner], wanted[owner])
-        return InverseSolutions(configurations, owner, *errors, search.least > 0)
+        return InverseSolutions(configurations, owner, *errors, isolated)
 
     def _nearest(
         self, search: Search, positions: Array, directions: Array
@@ -246,23 +257,6 @@ class InverseKinematics(ABC):
             found += [row[:count] for row, count in zip(rows, counts[lot], strict=True)]
         owner = np.repeat(np.arange(len(positions)), counts)
         return np.concatenate([np.empty((0, n_joints)), *found]), owner
-
-    def _search(self, axes: Array, near: Array, joints: int | None, seeds: int) -> Search:
-        """Check and complete a search."""
-        moved = _moved(self.arm, axes) if joints is None else joints
-        moved = whole_number("joints", moved, 1, self.arm.n_joints)
-        isolated = moved <= {0: 3, 1: 5, 3: 6}[len(axes)]
-        return Search(
-            tool=self.arm.chain.tool,
-            axes=axes,
-            scale=1.0 / self.arm.reach,
-            position_tolerance=POSITION_TOLERANCE,
-            rotation_tolerance=ROTATION_TOLERANCE,
-            near=near,
-            seeds=low_discrepancy_points(whole_number("seeds", seeds, 1), moved),
-            least=LEAST_SEEDS if isolated else 0,
-            separation=ISOLATED_SEPARATION if isolated else CONTINUUM_SEPARATION,
-        )
 
     def _targets(
         self, targets: ArrayLike, directions: ArrayLike | None

@@ -163,7 +163,7 @@ class Oracle:
 
     def _solve_lots(self, starts: Array, goals: Array) -> list[OracleSolutions]:
         """Solve trials together, or each in its own scene."""
-        if not self.simulator.world.has_random_bodies:
+        if not self.simulator.world.has_random_bodies or len(starts) == 0:
             return [self._solve_lot(starts, goals)]
         found = []
         for row in range(len(starts)):

@@ -181,8 +181,7 @@ def _far_enough(motions: Motions, what: str, configurations: Array) -> Array:
 
 def _world_of_all_joints(problem: ReachProblem) -> tuple[World, int]:
     """The world of a problem, all of whose joints are actuated, and how many move the tool."""
-    moving = [problem.scene.bodies[body].name for body in problem.scene.moving]
-    if moving:
+    if moving := [problem.scene.bodies[body].name for body in problem.scene.moving]:
         raise InvalidInputError(
             f"a plan knows no time at which it begins, and {', '.join(moving)} of the scene of "
             f"{problem.name} moves"

@@ -8,6 +8,7 @@ from kinarm.errors import InvalidInputError, StartInContactError
 from kinarm.policies import Oracle, OracleSolutions
 from kinarm.policies.oracle.inverse import steps_between
 from kinarm.problem import PROBLEMS
+from kinarm.scene import RandomBodies, Scene
 
 TRIALS = {"lrmate200ic_5l": 100, "paper": 150, "paper_flange": 220}
 
@@ -254,6 +255,13 @@ def test_solutions_are_joined(few, oracle):
     joined = OracleSolutions.concatenated([few, empty, few])
     for rows in (slice(4), slice(4, 8)):
         assert_identical(joined, few, rows)
+
+
+def test_no_trials_among_random_bodies_are_no_error():
+    size, place = (0.1, 0.1, 0.1), {"lower": (0.2, -0.6, 0.2), "upper": (0.7, 0.6, 0.8)}
+    bodies = RandomBodies(name="box", shape="box", smallest=size, largest=size, **place)
+    oracle = Oracle(PROBLEMS["both"].replace(scene=Scene(random_bodies=(bodies,))), threads=1)
+    assert len(oracle.solve_batch(np.zeros((0, 6)), np.zeros((0, 3)))) == 0
 
 
 def test_one_start_for_many_goals_and_one_goal_for_many_starts(oracle):
