@@ -137,6 +137,8 @@ def plan(problem: ProblemLike, start: ArrayLike | None, goal: ArrayLike, **setti
     limits, arm = wanted.limits(world.arm.velocity_limits), world.arm
     aim = finite_array("goal", goal, (PARTS.get(wanted.goal_kind, arm.n_joints),))
     place = aim[:3] if wanted.goal_kind in PARTS else arm.tool_position(aim)
+    if start is None and wanted.start_kind != "configuration":
+        raise InvalidInputError(f"no start is given, of which start_kind is {wanted.start_kind!r}")
     begin = arm.home if start is None else start
     starts = _reaching(world, wanted.start_kind, begin, "start", arm.home, joints)
     first = _far_enough(Motions(world, wanted.margin), "start", starts)[0]

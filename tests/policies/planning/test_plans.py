@@ -187,6 +187,7 @@ def test_random_bodies_that_touch_the_start_are_named():
         ({"goal": [0, 1.9, 0, 0, 0, 0]}, "goal is in contact: .* touches ground"),
         ({"start": [0, 1.9, 0, 0, 0, 0]}, "start is in contact: .* touches ground"),
         ({"goal": np.zeros(5)}, "goal must have shape"),
+        ({"start": None, "start_kind": "pose"}, "no start is given, of which start_kind is 'pose'"),
         ({"goal": np.full(6, 9.0)}, "goal lies outside the limits: axis_1 at 9"),
         ({"margin": 0.5}, "start is closer to contact than 0.5 m"),
         ({"margin": -0.1}, "margin must not be negative"),
