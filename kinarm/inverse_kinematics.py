@@ -170,8 +170,8 @@ class InverseKinematics(ABC):
             or five axes have for most poses [m, rad].
         best : bool
             Give the nearest configuration that was found to a target without
-            solution, with its error. An error of the arm's reach counts like
-            one of 1 rad.
+            solution, with its error, where seeds came no closer. An error of
+            the arm's reach counts like one of 1 rad.
         """
         arm = self.arm
         positions, wanted, axes = self._targets(targets, directions)
@@ -217,10 +217,7 @@ class InverseKinematics(ABC):
         It is the best of those at which seeds came no closer.
         """
         anywhere = search._replace(
-            position_tolerance=np.inf,
-            rotation_tolerance=np.inf,
-            least=0,
-            separation=CONTINUUM_SEPARATION,
+            position_tolerance=np.inf, rotation_tolerance=np.inf, least=0, separation=0.0
         )
         found, owner = self._solutions(anywhere, positions, directions, SEEDS)
         apart, turned = self._errors(search.axes, found, positions[owner], directions[owner])

@@ -385,6 +385,13 @@ class TestFewAxes:
         others = [minimize(missed, q, method="Nelder-Mead", bounds=bounds).fun for q in starts]
         assert missed(nearest.configurations[0]) <= min(others) + 1e-3
 
+    def test_the_nearest_of_similar_configurations_is_given(self):
+        """Seeds end at configurations that hardly differ, of which the first ones are not best."""
+        world = World("both", threads=1)
+        best = world.inverse_kinematics([0.7, 0.4, 0.6], [-0.3, 1.5, 2.0], best=True)
+        assert len(best) == 1
+        assert np.hypot(best.position_error / world.arm.reach, best.rotation_error) < 0.062
+
     def test_out_of_reach(self, elbow):
         """The arm stretches towards the target."""
         targets = [[2.0, 0.0, 0.4], [0.5, 0.1, 0.5]]
