@@ -117,7 +117,8 @@ def plan(problem: ProblemLike, start: ArrayLike | None, goal: ArrayLike, **setti
     Parameters
     ----------
     problem : ReachProblem, str or Path
-        Arm and scene. Random bodies are those of the episode with this start and goal.
+        Arm and scene. Random bodies are those of the episode with this start, whose goal lies
+        exactly where this one brings the tool: give its position, if its rest is drawn.
     start, goal : array_like
         Where it begins and ends, as their kinds in the settings say. It begins
         at home if ``start`` is None.
@@ -136,7 +137,7 @@ def plan(problem: ProblemLike, start: ArrayLike | None, goal: ArrayLike, **setti
     world, joints = _world_of_all_joints(ReachProblem.load(problem))
     limits, arm = wanted.limits(world.arm.velocity_limits), world.arm
     aim = finite_array("goal", goal, (PARTS.get(wanted.goal_kind, arm.n_joints),))
-    place = aim[:3] if wanted.goal_kind in PARTS else arm.tool_position(aim)
+    place = aim[:3] if wanted.goal_kind in PARTS else world.reached(aim[None])[0, :3]
     if start is None and wanted.start_kind != "configuration":
         raise InvalidInputError(f"no start is given, of which start_kind is {wanted.start_kind!r}")
     begin = arm.home if start is None else start

@@ -12,6 +12,7 @@ from configurations import pair_distances
 from kinarm.bodies import Body
 from kinarm.body_motion import BodyMotion
 from kinarm.errors import InvalidInputError, NoPathError
+from kinarm.goals import GoalSpecification
 from kinarm.policies import Plan, plan
 from kinarm.problem import PROBLEMS
 from kinarm.recording import record_path
@@ -168,6 +169,20 @@ def test_a_start_may_be_any_configuration_that_keeps_the_margin():
     assert pair_distances(world, dense(planned, 200.0)[1][0]).min() > margin
     nearest = world.inverse_kinematics(world.poses(planned.waypoints[0]), free=True)
     assert pair_distances(world, nearest.configurations[:1]).min() < margin
+
+
+def test_random_bodies_are_those_of_episodes_with_listed_configurations():
+    size, place = (0.1, 0.1, 0.1), {"lower": (0.2, -0.6, 0.2), "upper": (0.7, 0.6, 0.8)}
+    bodies = RandomBodies(name="box", shape="box", smallest=size, largest=size, **place)
+    listed = tuple(tuple(0.4 * q) for q in np.random.default_rng(2).normal(size=(20, 6)))
+    goal = GoalSpecification(kind="configuration", configurations=listed)
+    problem = PROBLEMS["both"].replace(scene=Scene(random_bodies=(bodies,)), goal=goal)
+    world = World(problem)
+    for row in world.reached(listed)[:6]:
+        planned = plan(problem, None, row[3:])
+        np.testing.assert_array_equal(planned.goal, row[:3])
+        episode = world.in_scene(planned.waypoints[0], row)
+        assert not episode.in_contact(dense(planned, 200.0)[1][0]).any()
 
 
 def test_random_bodies_that_touch_the_start_are_named():
