@@ -31,6 +31,14 @@ def scheduled(value: float, schedule: Schedule, done: float) -> float:
     return value if schedule == "constant" else value * (1 - done)
 
 
+def merged(own: Any, given: Any) -> Any:
+    """Copy what is given; a mapping keeps the entries of an own one that it does not name."""
+    if not isinstance(given, Mapping):
+        return given
+    kept = own if isinstance(own, Mapping) else {}
+    return {**kept, **{name: merged(kept.get(name), entry) for name, entry in given.items()}}
+
+
 MANY, WIDTHS = {"at_most": 100_000}, {"at_most": 4096}
 """Metadata of numbers that memory grows with, and of widths of layers."""
 
@@ -80,11 +88,8 @@ class TrainingConfig(Checked):
         return Simulator(self.training_problem, threads=threads)
 
     def changed(self, changes: Mapping[str, Any]) -> "TrainingConfig":
-        """Replace fields; a mapping replaces weights or entries that it names."""
-        given = dict(changes)
-        for name, value in changes.items():
-            if isinstance(value, Mapping) and isinstance(own := getattr(self, name), Mapping):
-                given[name] = {**own, **value}
+        """Replace fields; a mapping replaces weights, or entries at any depth, that it names."""
+        given = {name: merged(getattr(self, name), value) for name, value in changes.items()}
         if isinstance(given.get("reward"), Mapping):
             problem = self.training_problem.replace(reward=given["reward"])
             given["reward"] = problem.task.reward

@@ -9,7 +9,7 @@ from typing import Any
 from kinarm._fields import from_plain, init_fields, read_toml, take_base, to_plain
 from kinarm._files import shipped_files
 from kinarm.errors import InvalidInputError, UnknownNameError
-from kinarm.policies.config import ConfigT
+from kinarm.policies.config import ConfigT, merged
 from kinarm.policies.learners import Learner, find_learner
 from kinarm.problem import PROBLEMS
 
@@ -85,13 +85,11 @@ def _read_recipe(learner: Learner[Any, Any], path: Path, circumstances: Mapping[
             raise InvalidInputError(f"{path}: a recipe has no {key}; give it as --{key}")
     base = take_base(entries, str(path), learner.recipes, learner.first_recipe)
     standard = _named_recipe(learner, base, circumstances)
-    given, plain = {"recipe": path.stem, **entries}, to_plain(standard)
-    if "reward" in given:
+    plain = to_plain(standard)
+    if "reward" in entries:
         plain["reward"] = to_plain(standard.training_problem.task.reward)
-    for name, entry in given.items():
-        if isinstance(entry, Mapping) and isinstance(plain.get(name), Mapping):
-            given[name] = {**plain[name], **entry}
-    made = from_plain(learner.config, {**plain, **given}, str(path))
+    given = merged(plain, {"recipe": path.stem, **entries})
+    made = from_plain(learner.config, given, str(path))
     return replace(made, problem=standard.problem)
 
 

@@ -13,7 +13,7 @@ from kinarm._fields import from_plain, init_fields, to_plain
 from kinarm.errors import InvalidInputError, KinarmError, UnknownNameError
 from kinarm.evaluation.experiments.curve import TrialSettings
 from kinarm.evaluation.experiments.experiment import MOST_TRAININGS, Entry, Experiment
-from kinarm.policies.config import TrainingConfig
+from kinarm.policies.config import TrainingConfig, merged
 from kinarm.policies.learners import Learner, find_learner
 from kinarm.policies.recipes import recipe
 from kinarm.problem import ReachProblem
@@ -171,21 +171,22 @@ def _config(entry: Entry, problem: ReachProblem, entries: Mapping[str, Any]) -> 
             except KinarmError as error:
                 raise InvalidInputError(f"{key}: {error}") from error
         else:
-            _put(of_recipe, key, value)
+            of_recipe = merged(of_recipe, _put({}, key, value))
     config: TrainingConfig = recipe(
         entry.learner, entry.recipe or None, problem=problem.pinned, **of_recipe
     )
     return config
 
 
-def _put(table: dict[str, Any], path: str, value: Any) -> None:
-    """Put a value into nested tables."""
-    *outer, name = path.split(".")
-    for part in outer:
-        table = table.setdefault(part, {})
-        if not isinstance(table, dict):
-            raise InvalidInputError(f"{part!r} of {path!r} is no table")
-    table[name] = value
+def _put(table: dict[str, Any], path: str, value: Any) -> dict[str, Any]:
+    """Copy nested tables, with a value in them."""
+    name, _, rest = path.partition(".")
+    if rest:
+        inner = table.get(name, {})
+        if not isinstance(inner, dict):
+            raise InvalidInputError(f"{name!r} of {path!r} is no table")
+        value = _put(inner, rest, value)
+    return {**table, name: value}
 
 
 def _changed_problem(problem: ReachProblem, path: str, value: Any) -> ReachProblem:
@@ -196,8 +197,7 @@ def _changed_problem(problem: ReachProblem, path: str, value: Any) -> ReachProbl
     """
     if "." not in path:
         return problem.replace(**{path: value})
-    entries = problem.to_json()
-    _put(entries, path, value)
+    entries = _put(problem.to_json(), path, value)
     if path.startswith("arm."):
         entries["arm"].pop("digest", None)
     return from_plain(ReachProblem, entries, "problem")

@@ -140,6 +140,18 @@ class TestRuns:
         assert [run.choices for run in runs[:3]] == [{"episodes": 1}, {"episodes": 2}, {}]
         assert (runs[0].config.noise, runs[2].config.n_epochs) == (0.5, 2)
 
+    def test_a_table_and_a_path_into_it_are_one(self):
+        weights = [{"success": 1.0}, {"success": 2.0}]
+        for table in (
+            {"fixed": {"reward.collision": -7.0}},
+            {"grid": {"reward.collision": [-7.0]}},
+        ):
+            grid = {"reward": weights, **table.pop("grid", {})}
+            runs = planned(grid=grid, **table)
+            rewards = [run.config.training_problem.task.reward for run in runs]
+            assert [(each.collision, each.success) for each in rewards] == [(-7.0, 1), (-7.0, 2)]
+            assert [run.choices["reward"] for run in runs] == weights
+
     def test_other_seeds_are_those_of_every_entry(self, experiment):
         entries = [{"name": "a", "learner": "ars", "seeds": 5}, {"name": "b", "learner": "ars"}]
         made = Experiment.from_json({"name": "x", "entries": entries, "seeds": 2}, "x")

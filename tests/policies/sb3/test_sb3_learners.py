@@ -139,3 +139,14 @@ def test_a_recipe_file_and_a_change_replace_the_hyperparameters_that_they_name(t
         **tuned,
         "tau": 1.0,
     }
+
+
+def test_hyperparameters_of_hyperparameters_keep_the_others(tmp_path):
+    (tmp_path / "mine.toml").write_text(
+        'base = "hindsight"\nhyperparameters.policy_kwargs.net_arch = [8]\n'
+    )
+    kept = {**recipe("tqc", "hindsight").hyperparameters["policy_kwargs"], "net_arch": [8]}
+    changed = recipe("tqc", "hindsight", hyperparameters={"policy_kwargs": {"net_arch": [8]}})
+    for made in (recipe("tqc", tmp_path / "mine.toml"), changed):
+        assert made.hyperparameters["policy_kwargs"] == kept
+        assert made.hyperparameters["gamma"] == 0.95
