@@ -50,7 +50,7 @@ class Entry(Checked):
         by default.
     fixed, grid : dict
         Fixed values of fields, and lists of values, added to those of the
-        experiment.
+        experiment, or in their place.
     """
 
     name: str = field(default="", metadata=OPTIONAL)

@@ -136,6 +136,7 @@ def _settings(
     distinct = {}
     for shared, own in product(varied, _combinations(entry.grid)):
         choices = {**_concerning(shared, learner), **own}
+        choices = {key: value for key, value in choices.items() if key not in entry.fixed}
         distinct[repr(sorted(choices.items()))] = choices
     for problem in map(ReachProblem.load, entry.problems or experiment.problems):
         for choices in distinct.values():

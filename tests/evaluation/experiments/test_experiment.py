@@ -140,6 +140,16 @@ class TestRuns:
         assert [run.choices for run in runs[:3]] == [{"episodes": 1}, {"episodes": 2}, {}]
         assert (runs[0].config.noise, runs[2].config.n_epochs) == (0.5, 2)
 
+    def test_an_entrys_own_value_replaces_the_values_of_all(self):
+        entries = [
+            {"name": "a", "learner": "ars", "fixed": {"noise": 0.5}},
+            {"name": "b", "learner": "ars"},
+        ]
+        runs = planned(entries=entries, grid={"noise": [0.1, 0.2]})
+        found = [(run.entry.name, run.config.noise, run.choices) for run in runs]
+        others = [("b", noise, {"noise": noise}) for noise in (0.1, 0.2)]
+        assert found == [("a", 0.5, {}), *others]
+
     def test_a_table_and_a_path_into_it_are_one(self):
         weights = [{"success": 1.0}, {"success": 2.0}]
         for table in (
