@@ -11,7 +11,7 @@ from kinarm._fields import to_plain
 from kinarm._files import first_line, write_text
 from kinarm.errors import KinarmError, TrainingFailedError, needed
 from kinarm.evaluation.experiments.experiment import SAMPLERS, Experiment
-from kinarm.evaluation.experiments.plan import Run, plan
+from kinarm.evaluation.experiments.plan import Run, hash_of, plan
 from kinarm.evaluation.experiments.store import Store
 from kinarm.policies.config import TrainingConfig
 from kinarm.policies.recipes import PER_TRAINING
@@ -31,15 +31,19 @@ FAILURES = 20
 
 
 def _open_search(experiment: Experiment, folder: Path) -> "optuna.study.Study":
-    """Open or begin the search of an experiment in a folder."""
+    """Open or begin the search of an experiment, as it is, in a folder."""
     needed("optuna", "optuna", "tune")
     import optuna
     from optuna.storages import JournalStorage
     from optuna.storages.journal import JournalFileBackend
 
+    if experiment.sampler == "cmaes":
+        needed("cmaes", "cmaes", "tune")
     optuna.logging.set_verbosity(optuna.logging.ERROR)
+    # What was found with other settings or values says nothing here.
+    tried = {**experiment.to_json(), "search": experiment.searched}
     search = optuna.create_study(
-        study_name="kinarm",
+        study_name=hash_of(tried),
         storage=JournalStorage(JournalFileBackend(str(folder / JOURNAL))),
         direction="maximize",
         load_if_exists=True,
@@ -149,7 +153,6 @@ def _choices(experiment: Experiment, trial: Any) -> dict[str, Any]:
     return {
         key: trial.params[key] if isinstance(entry, Mapping) else entry[trial.params[key]]
         for key, entry in experiment.searched.items()
-        if key in trial.params
     }
 
 

@@ -1,9 +1,11 @@
 """Searches by Optuna: as many settings as asked for, and nothing stuck after an interruption."""
 
+import sys
+
 import pytest
 from small_studies import SMALL
 
-from kinarm.errors import InvalidInputError, TrainingFailedError
+from kinarm.errors import InvalidInputError, MissingExtraError, TrainingFailedError
 from kinarm.evaluation.experiments import study as studies
 from kinarm.evaluation.experiments.executors import LocalExecutor
 from kinarm.evaluation.experiments.experiment import Experiment
@@ -73,6 +75,28 @@ class TestSearch:
         study.run(jobs=1)
         assert states(study) == ["FAIL"] + ["COMPLETE"] * 6
         assert study.runs[0].config.step_size == stuck.params["step_size"]
+
+    @pytest.mark.parametrize(
+        "searched",
+        [
+            {"sharing": ["pair", "none", "iteration"]},
+            {"sharing": ["iteration"]},
+            {"step_size": {"low": 0.1, "high": 0.3, "log": True}},
+        ],
+    )
+    def test_another_search_begins_anew(self, tmp_path, searched):
+        for count, fields in ((2, {"sharing": ["none", "pair"]}), (3, searched)):
+            study = Study({**SEARCH, "search": {"count": count, **fields}}, tmp_path).run(jobs=1)
+        assert states(study) == ["COMPLETE"] * 3
+        assert all(run.choices.keys() == searched.keys() for run in study.runs)
+        if values := searched.get("sharing"):
+            assert {run.config.sharing for run in study.runs} <= set(values)
+
+    def test_cmaes_needs_a_package_of_its_own(self, tmp_path, monkeypatch):
+        monkeypatch.setitem(sys.modules, "cmaes", None)
+        search = {**SEARCH["search"], "sampler": "cmaes"}
+        with pytest.raises(MissingExtraError, match=r"cmaes is not installed: .*kinarm\[tune\]"):
+            Study({**SEARCH, "search": search}, tmp_path).run(jobs=1)
 
     def test_impossible_settings_are_replaced_by_others(self, tmp_path):
         impossible = {"count": 3, "top_directions": {"low": 3, "high": 6}}
