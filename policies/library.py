@@ -3,12 +3,13 @@
 import re
 from collections.abc import Iterable, Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from kinarm._files import absolute, is_file, is_folder, shipped_files
 from kinarm.errors import InvalidInputError, UnknownNameError
-from kinarm.observation_layout import ObservationLayout
+from kinarm.observation_layout import ObservationLayout, observation_layout
 from kinarm.policies.normalizer import Normalizer
 from kinarm.policies.policy import Policy
 from kinarm.problem import ReachProblem
@@ -87,24 +88,28 @@ def layer_widths(problem: ReachProblem, hidden: Sequence[int] = ()) -> tuple[int
     return (ObservationLayout.of(problem, arm).size, *hidden, arm.n_actuated)
 
 
-def starting_policy(name_or_file: str, widths: Sequence[int], residual: bool = False) -> Policy:
-    """Load a policy to begin a training with, of any arm and problem.
+def starting_policy(config: Any) -> Policy:
+    """Load the ``initial_policy`` of a training with ARS or PPO, of any arm and problem.
 
-    Its layers must have the training's widths, from observation to action, and functions; and
-    either both are residual, or neither.
+    Its layers must have the training's widths, from observation to action, and functions; it must
+    see the same; and either both are residual, or neither.
     """
-    policy = load_policy(name_or_file)
+    name, residual = config.initial_policy, getattr(config, "residual", False)
+    policy, widths = load_policy(name), layer_widths(config.problem, config.net_arch)
     own = policy.n_observations, *(len(layer.bias) for layer in policy.layers)
     usual = (*("tanh",) * (len(widths) - 2), "linear")
-    sides = (own, policy.activations, policy.residual), (tuple(widths), usual, residual)
+    sides = (own, policy.activations, policy.residual), (widths, usual, residual)
     if sides[0] != sides[1]:
         found, wanted = (
             f"{'-'.join(map(str, sizes))} ({', '.join(functions)}{'; residual' * adds})"
             for sizes, functions, adds in sides
         )
         raise InvalidInputError(
-            f"initial_policy {name_or_file!r} has layers {found}, the training {wanted}"
+            f"initial_policy {name!r} has layers {found}, the training {wanted}"
         )
+    seen, shown = map(observation_layout, (policy.problem, config.problem))
+    if seen != shown:
+        raise InvalidInputError(f"initial_policy {name!r} sees {seen}, the training {shown}")
     return policy
 
 

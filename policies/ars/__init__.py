@@ -57,8 +57,8 @@ class ARSConfig(TrainingConfig):
     replay_size : int
         Failed scenarios that are kept.
     initial_policy : str, optional
-        Name or file of a policy to begin with; it must have the same layers,
-        and may be for another problem or arm.
+        Name or file of a policy to begin with; it must see the same and have the
+        same layers, and may be for another problem or arm.
     """
 
     iterations: int = 800

@@ -49,7 +49,7 @@ class ARSTraining:
         rng = stream_generator(Stream.ARS, self.config.seed)
         normalizer = Normalizer.empty(n_observations)
         if self.config.initial_policy is not None:
-            policy = starting_policy(self.config.initial_policy, self._widths)
+            policy = starting_policy(self.config)
             theta = parameters_of(policy)
             if self.config.normalize:
                 normalizer = statistics(policy)

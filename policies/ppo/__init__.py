@@ -93,8 +93,8 @@ class PPOConfig(TrainingConfig):
         less noise, a policy never succeeds where it always fails. By default
         there is none.
     initial_policy : str, optional
-        Name or file of a policy to begin with; it must have the same layers,
-        and may be for another problem or arm.
+        Name or file of a policy to begin with; it must see the same and have the
+        same layers, and may be for another problem or arm.
     """
 
     iterations: int = 600

@@ -60,7 +60,7 @@ class PPOTraining:
         parameters = initial_parameters(rng, self._widths, config.log_std_init)
         normalizer = Normalizer.of(seen)
         if config.initial_policy is not None:
-            policy = starting_policy(config.initial_policy, self._widths, config.residual)
+            policy = starting_policy(config)
             normalizer = statistics(policy)
             actor = split_parameters(parameters, self._widths).actor
             for layer, (weights, bias) in zip(policy.layers, actor, strict=True):

@@ -96,6 +96,20 @@ def test_a_policy_that_normalises_is_refused_where_none_does(tmp_path):
     same_deeds(first_policy(config), plain)
 
 
+def test_a_policy_that_sees_something_else_is_refused(tmp_path):
+    """Even if its observation is as long."""
+    parts = ("goal", "goal_minus_tool", "joint_positions")
+    problems = [
+        PROBLEMS["right"].replace(observation=[*parts, last])
+        for last in ("last_action", "joint_velocities")
+    ]
+    config = ARSConfig(problem=problems[0], initial_policy=str(tmp_path / "a.npz"))
+    first_policy(replace(config, initial_policy=None)).save(tmp_path / "a.npz")
+    assert first_policy(config).n_observations == 17
+    with pytest.raises(InvalidInputError, match=r"sees 1: .*last_action 1a, the training 1: .*joi"):
+        first_policy(replace(config, problem=problems[1]))
+
+
 def test_steps_are_those_of_the_training():
     """Not the observations that the initial policy's statistics stand for."""
     settings = {"iterations": 2, "directions": 2, "top_directions": 1}
