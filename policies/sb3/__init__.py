@@ -52,7 +52,8 @@ class SB3Config(TrainingConfig):
         Whether it learns in the goal-conditioned environment, with hindsight
         replay.
     normalize : bool
-        Whether running statistics normalise observations.
+        Whether running statistics normalise observations, but for goals that
+        hindsight replaces.
     action_noise : float
         Standard deviation of noise added to actions in training.
     learning_rate_schedule : {"constant", "linear"}

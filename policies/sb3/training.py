@@ -168,7 +168,8 @@ def sb3_model(config: SB3Config) -> BaseAlgorithm:
     goals = config.hindsight
     env: VecEnv = sb3_vec_env(problem, config.n_envs, goal_conditioned=goals, threads=1)
     if config.normalize:
-        env = VecNormalize(env, norm_reward=False)
+        keys = ["observation"] if goals else None  # substituted goals would be clipped
+        env = VecNormalize(env, norm_reward=False, norm_obs_keys=keys)
     given: dict[str, Any] = {
         "policy": "MultiInputPolicy" if config.hindsight else "MlpPolicy",
         **deepcopy(config.hyperparameters),  # which the algorithm changes

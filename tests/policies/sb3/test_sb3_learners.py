@@ -105,6 +105,15 @@ def test_what_goes_wrong_in_a_step_is_raised_where_it_was_asked_for(monkeypatch,
         train_policy(config)
 
 
+def test_goals_that_hindsight_replaces_are_not_normalised():
+    config = config_of("tqc", normalize=True)
+    from kinarm.policies.sb3.training import sb3_model
+
+    model = sb3_model(config)
+    assert model.get_vec_normalize_env().norm_obs_keys == ["observation"]
+    assert Policy.from_sb3(model, config.problem).n_observations == 48
+
+
 def test_the_command_takes_hyperparameters(tmp_path):
     pytest.importorskip("stable_baselines3")
     given = ("--iterations", "12", "--hyperparameters", "gamma = 0.9, n_steps = 3")
