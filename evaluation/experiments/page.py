@@ -64,16 +64,10 @@ def write_csv(path: Path, rows: list[dict[str, Any]]) -> None:
 
 def results_document(study: "Study", command: str) -> dict[str, Any]:
     """Settings and results as JSON holds them."""
-    groups = study.groups()
     return {
         "command": command,
         "experiment": study.experiment.to_json(),
-        "reachable": {
-            group.config.problem.name: group.reachable
-            for group in groups
-            if group.bounds is not None
-        },
-        "results": [table.group_entries(group) for group in groups],
+        "results": [table.group_entries(group) for group in study.groups()],
         "commit": source_commit(),
         "versions": package_versions(),
     }

@@ -237,6 +237,7 @@ def group_entries(group: Group) -> dict[str, Any]:
         "problem": group.config.problem.name,
         "choices": dict(group.choices),
         "seeds": len(group.runs),
+        "reachable": None if group.bounds is None else group.reachable,
         "success": group.success.to_json(),
         "difference": group.first
         and {"first": group.first.label, "success": group.difference.to_json()},

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from small_studies import SMALL
 
-from kinarm.evaluation.experiments.page import learning_curves, write_all
+from kinarm.evaluation.experiments.page import learning_curves, results_document, write_all
 from kinarm.evaluation.experiments.study import Study
 from kinarm.evaluation.experiments.table import group_entries, group_row
 from kinarm.evaluation.statistics import Estimate, share_difference
@@ -61,6 +61,22 @@ class TestGroups:
         assert alone["difference"] is None
         assert compared["difference"]["first"] == first.label
         assert compared["difference"]["success"] == second.difference.to_json()
+
+    def test_what_a_policy_sees_makes_no_other_trials(self, small):
+        """Nor does resolved-rate control, which residual policies also see."""
+        learning = {"iterations": 1, "n_envs": 2, "n_steps": 4, "batch_size": 8}
+        entries = [
+            {"learner": "ars"},
+            {"learner": "ppo", "recipe": "best", "fixed": learning},
+            {"name": "short", "learner": "ars", "fixed": {"problem.task.horizon": 2}},
+        ]
+        study = small(grid={}, seeds=1, entries=entries).run(jobs=1)
+        first, second, other = study.groups()
+        assert second.first is first
+        assert other.first is None
+        assert len(study.bounds) == 2
+        found = [entry["reachable"] for entry in results_document(study, "")["results"]]
+        assert found[0] == found[1] > found[2]
 
     def test_the_best_comes_first(self, finished):
         best = finished.best(2)
