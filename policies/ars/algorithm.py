@@ -2,6 +2,7 @@
 
 import math
 import time
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -87,6 +88,8 @@ class ARSTraining:
             policies = perturbed_networks(theta, config.noise * delta, seen, self._widths)
         else:
             policies = perturbed_policies(theta, config.noise * delta, seen)
+        if simulator.task.goal.changes:  # to the left, too
+            policies = replace(policies, mirror=self.mirror)
         rollouts = simulator.rollout(
             policies,
             *scenarios.of_all_episodes,

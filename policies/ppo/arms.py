@@ -22,7 +22,8 @@ class TrainingArms:
     """Arms stepped together, whose episodes are replaced when they end.
 
     With a mirror, new goals on the left are reflected, so that a learner only
-    meets those on the right.
+    meets those on the right; later goals of an episode it meets reflected, as
+    its policy does.
 
     Attributes
     ----------
@@ -98,7 +99,15 @@ class TrainingArms:
         return self._normalized(self.episodes.observation)
 
     def _normalized(self, observations: NDArray[np.float64]) -> Numbers:
-        return ((observations - self._mean) * self._scale).astype(np.float32)
+        seen = self._reflected("observations", observations, observations)
+        return ((seen - self._mean) * self._scale).astype(np.float32)
+
+    def _reflected(self, what: str, values: Reals, observations: Reals) -> Reals:
+        """Observations or actions, reflected where a goal that came later lies on the left."""
+        if self.mirror is None or not self.simulator.task.goal.changes:
+            return values
+        left = observations[:, [self.mirror.side]] > 0
+        return np.where(left, values * getattr(self.mirror, what), values)
 
     def rates(self, observations: Reals) -> tuple[Reals, Reals]:
         """What a residual policy adds to, shape (n, n_actions), and its factor, shape (n, 1).
@@ -107,16 +116,18 @@ class TrainingArms:
         """
         if not self.config.residual:
             return np.zeros((1, 1), dtype=np.float32), np.ones((1, 1), dtype=np.float32)
-        rates = observations[:, self.simulator.world.layout.places["resolved_rate"]]
+        seen = self._reflected("observations", observations, observations)
+        rates = seen[:, self.simulator.world.layout.places["resolved_rate"]]
         return rates, np.abs(rates).max(axis=1, keepdims=True)
 
-    def step(self, actions: Numbers) -> tuple[Numbers, NDArray[np.bool_]]:
+    def step(self, actions: Reals) -> tuple[Numbers, NDArray[np.bool_]]:
         """Move arms by actions, shape (n_envs, n_actions); renew ended episodes.
 
         Returns rewards, and which episodes ended, shape (n_envs,) each.
         """
         episodes = self.episodes
         replaced = episodes.interventions.copy()
+        actions = self._reflected("actions", actions, episodes.observation)
         result = self.simulator.step(episodes, actions)
         rewards = result.reward.copy()
         if len(replaced):

@@ -327,6 +327,27 @@ def test_impossible_settings_are_refused(settings, message):
         ARSConfig(**settings)
 
 
+def test_later_goals_are_met_as_the_policy_meets_them(monkeypatch):
+    """Also on the left, where the policy sees them reflected."""
+    problem = PROBLEMS["both"].replace(goal={"sequence": 3}, tolerance=0.2)
+    changes = {"initial_policy": "ars-linear-both-seed0", "noise": 1e-9, "episodes": 8}
+    config = replace(TINY, problem=problem, symmetric=True, **changes)
+    training = ARSTraining(config, threads=1)
+    state = training.initial_state()
+    rollout, met = training.simulator.rollout, []
+
+    def watched(policies, *scenarios, **others):
+        met.append((scenarios, rollout(policies, *scenarios, **others).returns))
+        return rollout(policies, *scenarios, **others)
+
+    monkeypatch.setattr(training.simulator, "rollout", watched)
+    training.iterate(state)
+    ((scenarios, returns),) = met
+    expected = rollout(state_policy(config, state), *scenarios)
+    assert (expected.goals_reached > 0).sum() > 5
+    np.testing.assert_allclose(returns, expected.returns, atol=1e-3)
+
+
 def test_policies_at_any_time_of_a_training_have_the_mirror():
     config, states = replace(TINY, problem="both", symmetric=True), []
     train_policy(config, on_iteration=states.append)

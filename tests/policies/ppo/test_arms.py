@@ -11,6 +11,8 @@ from kinarm.failed_scenarios import FailedScenarios
 from kinarm.policies import Normalizer, PPOConfig, PPOState
 from kinarm.policies.ppo import EpisodeStates
 from kinarm.policies.ppo.arms import TrainingArms
+from kinarm.policies.ppo.learner import PPOTraining
+from kinarm.policies.ppo.networks import actor_policy
 from kinarm.problem import PROBLEMS
 from kinarm.randomness import Stream, stream_generator
 from kinarm.simulator import Simulator
@@ -178,6 +180,27 @@ class TestMirror:
         image = np.where(left[:, None], drawn.q * AXES, drawn.q)
         np.testing.assert_array_equal(met.q[:, :5], image[:, :5])  # the last joint is held
         np.testing.assert_array_equal(met.goal[:, 1], -np.abs(drawn.goal[:, 1]))
+
+    def test_later_goals_are_met_as_the_policy_meets_them(self):
+        """Also on the left, where the policy sees them reflected."""
+        settings = {"goal": {"sequence": 3}, "tolerance": 0.3, "horizon": 30}
+        problem = PROBLEMS["both"].replace(**settings)
+        config = PPOConfig(problem=problem, n_envs=40, n_steps=50, residual=True, symmetric=True)
+        training = PPOTraining(config, threads=1)
+        state, arms, networks = training.initial_state(), training.arms, training.networks
+        arms.restore(state, np.random.default_rng(0))
+        networks.load(state.parameters)
+        begun = state.episodes.start, state.episodes.goal
+        expected = arms.simulator.rollout(actor_policy(config, state), *begun)
+        over, total = np.zeros(40, dtype=bool), np.zeros(40)
+        for _ in range(30):
+            rates, extent = arms.rates(arms.episodes.observation)
+            rewards, ended = arms.step(rates + extent * networks.means(arms.observe()))
+            total[~over] += rewards[~over]
+            over |= ended
+        assert over.all()
+        assert (expected.goals_reached > 1).sum() > 5
+        np.testing.assert_allclose(total, expected.returns, atol=1e-3)
 
     def test_right_goals_are_untouched(self, begun):
         plain, mirrored = (begun(number=30, symmetric=on)[0] for on in (False, True))
