@@ -2,6 +2,7 @@
 
 import itertools
 import time
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -76,8 +77,16 @@ class PPOTraining:
         )
 
     def _seen(self, rng: np.random.Generator) -> NDArray[np.float64]:
-        """Observations of random starts; if they tell of earlier steps, after some at random."""
+        """Observations of random starts; if they tell of earlier steps, after some at random.
+
+        If a joint always starts alike, starts are those of its whole range: inputs that never
+        change count for nothing.
+        """
         simulator, scenarios = self.arms.simulator, self.arms.sample(rng, NORMALIZED_OVER)
+        if not np.ptp(scenarios[0][:, : simulator.n_actions], axis=0).all():
+            whole = self.config.problem.replace(starts=(), start_spread=1.0)
+            arms = TrainingArms(replace(self.config, problem=whole))
+            scenarios = arms.sample(rng, NORMALIZED_OVER)
         if not simulator.world.layout.remembers:
             return simulator.world.observe(*scenarios)
         episodes = simulator.reset(*scenarios)

@@ -219,6 +219,16 @@ def predicted(training, state, observations):
     return actions if mirror is None else np.where(left[:, None], actions * mirror.actions, actions)
 
 
+@pytest.mark.parametrize("changes", [{"start_spread": 0.0}, {"starts": ((0.1,) * 6,)}])
+def test_a_policy_sees_its_joints_wherever_episodes_start(changes):
+    """Also if all do at one configuration, as of which joints were constant inputs."""
+    same, usual = (
+        PPOTraining(replace(TINY, problem=problem), threads=1).initial_state().normalizer.std
+        for problem in (TINY.problem.replace(**changes), TINY.problem)
+    )
+    np.testing.assert_array_equal(same > 1e-6, usual > 1e-6)
+
+
 def test_policy_acts_like_the_actor(trained):
     config, _, states = trained
     training, state = PPOTraining(config), replace(states[-1], parameters=states[-1].parameters * 1)
