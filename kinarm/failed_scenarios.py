@@ -58,7 +58,7 @@ class FailedScenarios(NamedTuple):
         share: float,
         rng: np.random.Generator,
         count: int,
-        draw: Callable[[NDArray[np.int64]], StartsAndGoals],
+        draw: Callable[[int], StartsAndGoals],
     ) -> tuple[StartsAndGoals, NDArray[np.bool_]]:
         """Draw scenarios, a share of them from these.
 
@@ -69,7 +69,7 @@ class FailedScenarios(NamedTuple):
         rng : numpy.random.Generator
             Decides which of them; not asked if none can be.
         draw : callable
-            Draws new ones, given their ascending places among all.
+            Draws so many new ones.
 
         Returns
         -------
@@ -77,14 +77,12 @@ class FailedScenarios(NamedTuple):
             Starts and goals, and which failed before, an array of bool of shape
             (count,).
         """
-        every = np.arange(count)
         if not share or not len(self.goals):
-            return draw(every), np.zeros(count, dtype=bool)
+            return draw(count), np.zeros(count, dtype=bool)
         chance, choice = rng.random((2, count))
         replayed = chance < share
         picked = (choice * len(self.goals)).astype(np.int64)
         starts, goals = self.starts[picked], self.goals[picked]
-        new = every[~replayed]
-        if new.size:
-            starts[new], goals[new] = draw(new)
+        if not replayed.all():
+            starts[~replayed], goals[~replayed] = draw(int(np.count_nonzero(~replayed)))
         return (starts, goals), replayed

@@ -79,10 +79,11 @@ def missing_mirror(problem: ReachProblem) -> str:
 def different_regions(problem: ReachProblem, symmetric: bool) -> int:
     """Goal regions that a policy meets, those on the left mirrored if symmetric."""
     regions = (problem.scene.goal_region(name) for name in problem.task.goal_regions)
-    boxes = [(region.lower, region.upper) for region in regions]
-    if symmetric:
-        boxes = [_reflected(*box) if box[0][1] >= 0 else box for box in boxes]
-    return len(set(boxes))
+    found = set()
+    for (x, y, z), (far_x, far_y, far_z) in ((each.lower, each.upper) for each in regions):
+        right = (-far_y, -y) if symmetric and y >= 0 else (y, far_y)
+        found.add((x, far_x, *right, z, far_z))
+    return len(found)
 
 
 def obstacles_are_symmetric(problem: ReachProblem) -> bool:
@@ -114,8 +115,3 @@ def _outline(body: Body, signs: Point = (1.0, 1.0, 1.0)) -> tuple[Any, ...]:
     motion = None if body.motion is None else body.motion.reflected(signs)
     radius = body.size[:1] if body.shape != "box" else ()
     return body.shape, radius, frozenset(map(tuple, rounded.tolist())), motion
-
-
-def _reflected(lower: Point, upper: Point) -> tuple[Point, Point]:
-    """Mirror image of a box."""
-    return (lower[0], -upper[1], lower[2]), (upper[0], -lower[1], upper[2])

@@ -67,9 +67,6 @@ def attempt(work: Callable[[Any], Any], task: bytes) -> Any:
 WATCHED = 0.2
 """How often a worker looks for its parent [s]."""
 
-REPLACED = "A worker stopped while some jobs were given to the executor"
-"""Loky's warning that a worker's memory has grown: kernels are no leak."""
-
 THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
 """Environment variables for the number of threads of libraries."""
 
@@ -102,7 +99,8 @@ class LocalExecutor:
 
         from joblib.externals.loky import get_reusable_executor
 
-        warnings.filterwarnings("ignore", REPLACED, UserWarning)
+        # Loky warns that a worker's memory has grown: kernels are no leak.
+        warnings.filterwarnings("ignore", "A worker stopped while some jobs", UserWarning)
         resource_tracker.ensure_running()  # where it begins, it lets signals through again
         with kept_from_children():
             pool = get_reusable_executor(

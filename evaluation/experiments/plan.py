@@ -22,9 +22,6 @@ from kinarm.problem import ReachProblem
 CHOSEN = {"seed", "recipe"}
 """Settings that the experiment chooses."""
 
-PROBLEM = "problem."
-"""Beginning of the path of a field of the problem."""
-
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Run:
@@ -173,9 +170,10 @@ def _config(entry: Entry, problem: ReachProblem, entries: Mapping[str, Any]) -> 
     """A recipe for a problem, with some fields of both changed."""
     of_recipe: dict[str, Any] = {}
     for key, value in entries.items():
-        if key.startswith(PROBLEM):
+        part, _, path = key.partition(".")
+        if part == "problem":
             try:
-                problem = _changed_problem(problem, key.removeprefix(PROBLEM), value)
+                problem = _changed_problem(problem, path, value)
             except KinarmError as error:
                 raise InvalidInputError(f"{key}: {error}") from error
         else:

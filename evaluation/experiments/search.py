@@ -13,7 +13,6 @@ from kinarm.errors import KinarmError, TrainingFailedError, needed
 from kinarm.evaluation.experiments.experiment import SAMPLERS, Experiment
 from kinarm.evaluation.experiments.plan import Run, hash_of, plan
 from kinarm.evaluation.experiments.store import Store
-from kinarm.policies.config import TrainingConfig
 from kinarm.policies.recipes import PER_TRAINING
 
 if TYPE_CHECKING:
@@ -87,7 +86,9 @@ def carry_out_search(experiment: Experiment, store: Store, jobs: int, train_all:
         failed |= _try_settings(experiment, search, store, min(jobs, missing), train_all)
     if _complete(search):
         best = plan(experiment, [_choices(experiment, search.best_trial)])[0]
-        write_text(store.folder / RECIPE, tomli_w.dumps(recipe_entries(best.config)))
+        left_out = (*PER_TRAINING, "recipe")
+        entries = {k: v for k, v in to_plain(best.config).items() if k not in left_out}
+        write_text(store.folder / RECIPE, tomli_w.dumps(entries))
     if missing:
         raise TrainingFailedError(failed, len(search.trials))
 
@@ -154,9 +155,3 @@ def _choices(experiment: Experiment, trial: Any) -> dict[str, Any]:
         key: trial.params[key] if isinstance(entry, Mapping) else entry[trial.params[key]]
         for key, entry in experiment.searched.items()
     }
-
-
-def recipe_entries(config: TrainingConfig) -> dict[str, Any]:
-    """Settings of a recipe file, without those of a single training."""
-    entries = to_plain(config)
-    return {name: entries[name] for name in entries if name not in (*PER_TRAINING, "recipe")}

@@ -288,8 +288,8 @@ class Study:
         return tuple(groups)
 
     def best(self, count: int = 1) -> tuple[Group, ...]:
-        """The groups with the largest relative success, best first."""
-        ordered = sorted(self.groups(), key=lambda group: -group.relative_success)
+        """The groups with the largest success for what the oracle reaches, best first."""
+        ordered = sorted(self.groups(), key=lambda one: -one.hits.mean() / max(one.reachable, 1e-9))
         return tuple(ordered[:count])
 
     def _label(self, run: Run) -> str:

@@ -1,7 +1,7 @@
 """Groups of finished trainings, and tables of them."""
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from operator import attrgetter
@@ -77,11 +77,6 @@ class Group:
     def reachable(self) -> float:
         """Share of trials that the oracle solves; 1 if unknown."""
         return 1.0 if self.bounds is None else float(self.bounds.reachable.mean())
-
-    @property
-    def relative_success(self) -> float:
-        """Success over what the oracle reaches."""
-        return (self.success.value or 0.0) / max(self.reachable, 1e-9)
 
     @cached_property
     def estimates(self) -> dict[str, Estimate]:
@@ -173,14 +168,12 @@ def _until_column(level: float) -> Column[Group]:
     return Column(f"thousand steps, minutes to {level:.0%}", text, name, priority=1)
 
 
-def _number_column(
-    heading: str, name: str, value: Callable[[Group], float], per: float, priority: float
-) -> Column[Group]:
-    """The column of a number, which is shown per a unit."""
+def _number_column(heading: str, name: str, per: float, priority: float) -> Column[Group]:
+    """The column of a number of groups, by its name, which is shown per a unit."""
     digits = 1 if heading.endswith("%") else 2
 
     def text(group: Group) -> str:
-        number = value(group) / per
+        number = getattr(group, name) / per
         return "" if math.isnan(number) else f"{number:.{digits}f}"
 
     return Column(heading, text, name, priority=priority)
@@ -198,9 +191,9 @@ COLUMNS: tuple[Column[Group], ...] = (
         priority=9.5,
     ),
     *(metric_column(name, attrgetter("estimates")) for name in FIGURES[1:]),
-    _number_column("worst seed %", "worst_seed", attrgetter("worst_seed"), 0.01, 10.5),
-    _number_column("million steps", "environment_steps", attrgetter("environment_steps"), 1e6, 9),
-    _number_column("minutes", "processor_seconds", attrgetter("processor_seconds"), 60, 9),
+    _number_column("worst seed %", "worst_seed", 0.01, 10.5),
+    _number_column("million steps", "environment_steps", 1e6, 9),
+    _number_column("minutes", "processor_seconds", 60, 9),
     *map(_until_column, LEVELS),
 )
 """Minutes are processor time without the trials of the policies."""

@@ -12,12 +12,11 @@ from kinarm.episodes import Rollouts
 from kinarm.errors import InvalidInputError
 from kinarm.failed_scenarios import FailedScenarios, StartsAndGoals
 from kinarm.kernels.compiling import Array
-from kinarm.networks import Layer, Mirror, Networks
+from kinarm.networks import Layer, Mirror, Networks, split_parameters
 from kinarm.policies.ars import ARSConfig, ARSState
 from kinarm.policies.ars.networks import (
     first_deviations,
     initial_network,
-    network_layers,
     parameters_of,
     perturbations,
     perturbed_networks,
@@ -165,8 +164,8 @@ def draw_shared(
     """
     copies = {"none": 1, "pair": 2, "iteration": 2 * config.directions}[config.sharing]
 
-    def draw(places: NDArray[np.int64]) -> StartsAndGoals:
-        drawn = simulator.sample(rng, len(places))
+    def draw(count: int) -> StartsAndGoals:
+        drawn = simulator.sample(rng, count)
         return drawn if mirror is None else mirror.scenarios_from_the_right(*drawn)
 
     count = 2 * config.directions * config.episodes // copies
@@ -237,7 +236,8 @@ def trained_policy(config: ARSConfig, state: ARSState) -> Policy:
     normalizer = policy_normalizer(config, state.normalizer)
     layers: tuple[Layer, ...] = (Layer(state.theta, np.zeros(len(state.theta))),)
     if config.net_arch:
-        layers = network_layers(state.theta, layer_widths(config.problem, config.net_arch))
+        batches = split_parameters(state.theta, layer_widths(config.problem, config.net_arch))
+        layers = tuple(Layer(weights[0], bias[0]) for weights, bias in batches)
     return Policy(
         mean=normalizer.mean,
         std=normalizer.std,

@@ -86,14 +86,6 @@ def perturbed_networks(
     return Networks((Layer(*folded), *rest))
 
 
-def network_layers(theta: Array, widths: Sequence[int]) -> tuple[Layer, ...]:
-    """Layers of a network with the parameters theta, shape (1, n_parameters).
-
-    Widths are those from observation to action.
-    """
-    return tuple(Layer(weights[0], bias[0]) for weights, bias in split_parameters(theta, widths))
-
-
 def parameters_of(policy: Policy) -> Array:
     """Parameters of a policy for a training; linear ones have no bias."""
     if len(policy.layers) > 1:

@@ -228,8 +228,6 @@ class PPOState(TrainingState):
         What may be replayed.
     scenarios : int
         Scenarios drawn so far, but for replays.
-    curve : tuple of CurvePoint
-        One point per finished iteration.
     """
 
     parameters: NDArray[np.float32]

@@ -149,12 +149,8 @@ class TrainingArms:
         if config.replay_share:
             scenarios = self._start[missed], episodes.first_goals[missed]
             self.failed = self.failed.followed_by(*scenarios, config.replay_size)
-
-        def draw(places: NDArray[np.int64]) -> StartsAndGoals:
-            return self.next_scenarios(len(places))
-
         scenarios, self.replayed[rows] = self.failed.mixed(
-            config.replay_share, self._rng, len(rows), draw
+            config.replay_share, self._rng, len(rows), self.next_scenarios
         )
         self._start[rows], episodes.goal[rows] = scenarios
         episodes.q[rows] = self._start[rows]

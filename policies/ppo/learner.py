@@ -85,8 +85,8 @@ class PPOTraining:
         simulator, scenarios = self.arms.simulator, self.arms.sample(rng, NORMALIZED_OVER)
         if not np.ptp(scenarios[0][:, : simulator.n_actions], axis=0).all():
             whole = self.config.problem.replace(starts=(), start_spread=1.0)
-            arms = TrainingArms(replace(self.config, problem=whole))
-            scenarios = arms.sample(rng, NORMALIZED_OVER)
+            elsewhere = TrainingArms(replace(self.config, problem=whole))
+            scenarios = elsewhere.sample(rng, NORMALIZED_OVER)
         if not simulator.world.layout.remembers:
             return simulator.world.observe(*scenarios)
         episodes = simulator.reset(*scenarios)

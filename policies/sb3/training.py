@@ -32,9 +32,6 @@ from kinarm.policies.sb3 import ALGORITHMS, SB3Config, SB3State
 from kinarm.policies.sb3.environment import sb3_vec_env
 from kinarm.policies.sb3.hindsight import HindsightReplayBuffer
 
-REPEATING = "repeating what was done before"
-"""Told while a training repeats its beginning."""
-
 REFUSALS = (
     *(AssertionError, AttributeError, ImportError, KeyError, RuntimeError, TypeError, ValueError),
 )
@@ -135,7 +132,7 @@ class SB3Training:
         """The algorithm after an iteration, repeated if need be."""
         if self._done == iteration:
             return self._learning.model
-        say_why_it_waits(REPEATING)
+        say_why_it_waits("repeating what was done before")
         if not 0 <= self._done < iteration:
             self._learning.abandon()
             self._begin()

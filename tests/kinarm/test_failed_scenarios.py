@@ -35,21 +35,21 @@ def test_the_last_ones_are_kept_and_repeated_ones_more_than_once():
 def test_before_the_first_failure_all_are_new_and_no_number_is_drawn():
     rng = np.random.default_rng(0)
     scenarios, replayed = FailedScenarios.none(6).mixed(
-        0.5, rng, 3, lambda places: numbered(*places)
+        0.5, rng, 3, lambda count: numbered(*range(count))
     )
     assert numbers(scenarios) == [0, 1, 2]
     assert not replayed.any()
     failed = FailedScenarios(*numbered(7, 8))
-    assert not failed.mixed(0.0, rng, 3, lambda places: numbered(*places))[1].any()
+    assert not failed.mixed(0.0, rng, 3, lambda count: numbered(*range(count)))[1].any()
     assert rng.random() == np.random.default_rng(0).random()
 
 
 def test_a_share_comes_again_each_as_often_as_it_is_kept():
     failed = FailedScenarios(*numbered(-1, -2, -2, -2))
     rng, n = np.random.default_rng(3), 20_000
-    scenarios, replayed = failed.mixed(0.3, rng, n, lambda places: numbered(*places))
+    scenarios, replayed = failed.mixed(0.3, rng, n, lambda count: numbered(*range(count)))
     found = np.array(numbers(scenarios))
     assert stats.binomtest(int(replayed.sum()), n, 0.3).pvalue > 1e-3
-    np.testing.assert_array_equal(found[~replayed], np.flatnonzero(~replayed))
+    np.testing.assert_array_equal(found[~replayed], np.arange(np.count_nonzero(~replayed)))
     twos = int((found[replayed] == -2).sum())
     assert stats.binomtest(twos, int(replayed.sum()), 0.75).pvalue > 1e-3

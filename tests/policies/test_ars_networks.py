@@ -8,13 +8,13 @@ from numba import njit
 from scipy import stats
 
 from kinarm.kernels.lanes import LANES
+from kinarm.networks import split_parameters
 from kinarm.observation_layout import ObservationLayout
 from kinarm.policies import ARSConfig, train_policy
 from kinarm.policies.ars.networks import (
     first_deviations,
     initial_network,
     logarithm,
-    network_layers,
     normal_pairs,
     perturbations,
     perturbed_networks,
@@ -43,9 +43,9 @@ def test_first_network_does_nothing_and_has_lively_inner_layers():
     deviations = np.repeat([0.5, 0.02], 200)
     theta = initial_network(np.random.default_rng(0), deviations, (100, 50, 2))
     assert theta.shape == (1, 401 * 100 + 101 * 50 + 51 * 2)
-    first, second, last = network_layers(theta, (400, 100, 50, 2))
-    assert first.weights[:, :200].std() == pytest.approx(0.5, rel=0.02)
-    assert first.weights[:, 200:].std() == pytest.approx(0.02, rel=0.02)
+    first, second, last = split_parameters(theta, (400, 100, 50, 2))
+    assert first.weights[..., :200].std() == pytest.approx(0.5, rel=0.02)
+    assert first.weights[..., 200:].std() == pytest.approx(0.02, rel=0.02)
     assert second.weights.std() == pytest.approx(1 / 10, rel=0.05)
     still = (first.bias, second.bias, last.weights, last.bias)
     assert not any(array.any() for array in still)
@@ -70,7 +70,7 @@ def test_perturbed_networks_take_raw_observations():
     networks = perturbed_networks(theta, step, normalizer, WIDTHS)
     for row in range(6):
         parameters = theta + step[row] if row < 3 else theta - step[row - 3]
-        layers = network_layers(parameters, WIDTHS)
+        layers = [(weights[0], bias[0]) for weights, bias in split_parameters(parameters, WIDTHS)]
         expected = forward(layers, (x - normalizer.mean) * scale)
         np.testing.assert_allclose(by_networks(networks, row, x), expected, atol=1e-12)
 

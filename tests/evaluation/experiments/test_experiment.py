@@ -240,6 +240,7 @@ class TestProblem:
     ("entries", "words"),
     [
         ({"fixed": {"learning_rate": 1.0}}, "unknown field of a recipe or problem 'learning_rate'"),
+        ({"grid": {"problem": ["left"]}}, "problem: unknown setting of a problem ''"),
         ({"grid": {"noise": [0.1, -1.0]}}, "noise must be greater than 0, got -1.0"),
         (
             {"grid": {"problem.task.start_spread": [0.2, 3.0]}},

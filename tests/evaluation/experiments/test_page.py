@@ -79,8 +79,8 @@ class TestGroups:
         assert found[0] == found[1] > found[2]
 
     def test_the_best_comes_first(self, finished):
-        best = finished.best(2)
-        assert best[0].relative_success >= best[1].relative_success
+        first, second = finished.best(2)
+        assert first.success.value >= second.success.value
 
 
 @pytest.fixture(scope="module")
