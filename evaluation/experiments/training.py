@@ -88,6 +88,7 @@ def train_all(
         Replace earlier policies; keep the folder when all are finished.
     """
     find_learner(config.learner).check_installed()
+    config = replace(config, problem=config.problem.pinned)
     runs = {
         Run(learner=config.learner, config=replace(config, seed=seed), trials=TRIALS): out
         for seed, out in outs.items()
@@ -106,8 +107,7 @@ def train_all(
 
     def leave(run: Run, result: TaskResult) -> None:
         curve = curves[run] = result.iterations
-        points = enumerate(curve, start=1)
-        rows = [{"iteration": n, **point._asdict()} for n, point in points]
+        rows = [{"iteration": n, **point._asdict()} for n, point in enumerate(curve, start=1)]
         write_text(runs[run].with_suffix(".curve.csv"), csv_text(rows))
         study.policy(run).save(runs[run])
 

@@ -76,6 +76,19 @@ def test_the_same_command_finishes_each_seed_and_repeats_none(run, tmp_path, mon
     assert len(list(tmp_path.glob("[!.]*"))) == 6
 
 
+def test_an_arm_that_changed_makes_other_trainings(run, tmp_path, shipped_arms):
+    text = shipped_arms["paper"].description.path.read_text()
+    arm, out = tmp_path / "own.urdf", tmp_path / "out"
+    arguments = ("ars", "--arm", arm, "--iterations", 2, *SMALL, "--seeds", 1, "--out", out)
+    arm.write_text(text)
+    assert run("kinarm-train", *arguments).status == 0
+    assert "finished earlier" in run("kinarm-train", *arguments).out
+    arm.write_text(re.sub('lower="[^"]*"', 'lower="-2"', text, count=1))
+    answer = run("kinarm-train", *arguments)
+    assert (answer.status, answer.out) == (2, "")
+    assert "is of the experiment 'ars-paper-right " in answer.err
+
+
 def test_a_policy_that_was_not_written_is_made_again_and_more_seeds_are_trained(run, tmp_path):
     """A kill between training and policy leaves the training alone."""
     arguments = ("ars", "--problem", "right", "--iterations", 9, *SMALL, "--out", tmp_path)
