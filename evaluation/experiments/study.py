@@ -113,7 +113,7 @@ class Study:
         ----------
         jobs, threads : int
             Trainings at a time, one a processor by default, and threads of
-            each; neither changes results.
+            each; neither changes a training, but the first what a search tries.
         executor : Executor, optional
             Where trainings run; processes of this machine by default.
         on_trained : callable
