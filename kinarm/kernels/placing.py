@@ -112,17 +112,10 @@ def draw_scenes(
         forward_kinematics(chain, starts, e, poses)
         tool = to_world(poses, starts.shape[1], chain.tool[0], chain.tool[1], chain.tool[2])
         for entry in range(draws.entries.shape[0]):
-            row, fewest, most = (
-                draws.entries[entry, 0],
-                draws.entries[entry, 1],
-                draws.entries[entry, 2],
-            )
-            near, surface = draws.entries[entry, 3], draws.entries[entry, 4]
-            low, high, extents = (
-                draws.places[entry, 0],
-                draws.places[entry, 1],
-                draws.extents[entry],
-            )
+            given, places = draws.entries[entry], draws.places[entry]
+            row, fewest, most = given[0], given[1], given[2]
+            near, surface, extents = given[3], given[4], draws.extents[entry]
+            low, high = places[0], places[1]
             count = fewest + int(uniform(state) * (most - fewest + 1))
             for body in range(row, row + count):
                 placed = False
@@ -133,7 +126,7 @@ def draw_scenes(
                         least, largest = draws.sizes[entry, 0, i], draws.sizes[entry, 1, i]
                         share = numbers[draws.measures[entry, i]]
                         rows[body, i] = least + share * (largest - least)
-                    turn_row(draws.entries[entry, 5], state, rows[body])
+                    turn_row(given[5], state, rows[body])
                     x = low[0] + uniform(state) * (high[0] - low[0])
                     y = low[1] + uniform(state) * (high[1] - low[1])
                     z = low[2] + uniform(state) * (high[2] - low[2])

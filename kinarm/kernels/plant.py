@@ -77,10 +77,9 @@ def draw_plants(
         plant[DELAY] = lower + math.floor(uniform(state) * (upper - lower + 1.0))
         bandwidth, damping, acceleration = drawn[1], drawn[2], drawn[3]
         plant[RESOLUTION], plant[NOISE], plant[GOAL_NOISE] = drawn[4], drawn[5], drawn[8]
-        fill_servo(plant, bandwidth, damping, part)
         plant[MOST_CHANGE] = acceleration * part if acceleration > 0.0 else np.inf
         plant[TRAPEZE] = 0.5 if bandwidth > 0.0 else 0.0
-        fill_calm(plant, bandwidth, damping, part)
+        fill_servo(plant, bandwidth, damping, part)
         for kind in range(2):
             for axis in range(n_actuated):
                 offset = drawn[6 + kind] * (2.0 * uniform(state) - 1.0)
@@ -91,15 +90,22 @@ def draw_plants(
 
 @inlined
 def fill_servo(plant: Array, bandwidth: float, damping: float, part: float) -> None:
-    """Fill in how a servo's error and velocity follow from those a part of a step before."""
+    """Fill in how a servo's error and velocity follow from those a part of a step before.
+
+    And the rate of the joints' swing, and up to which speed no limit acts on it: a servo
+    accelerates by at most rate^2 |e| + 2 damping rate |v|; joints that obey at once change their
+    velocity by at most |v| + rate |e|.
+    """
     rate = TURN * bandwidth
-    decay = rate * damping
-    if bandwidth == 0.0 or decay * part > 500.0:
+    decay, split = rate * damping, rate * math.sqrt(abs(1.0 - damping * damping))
+    # Of two exponentials, the slower one says whether a part of a step is long.
+    slowest = decay - split if damping > 1.0 else decay
+    if bandwidth == 0.0 or slowest * part > 500.0:
         plant[SERVO], plant[SERVO + 1] = 0.0, 0.0
         plant[SERVO + 2], plant[SERVO + 3] = -1.0 / part, 0.0
+        plant[RATE], gain = 1.0 / part, 2.0
     else:
         # e'' = -rate^2 e - 2 damping rate e', by its two exponentials or damped oscillation.
-        split = rate * math.sqrt(abs(1.0 - damping * damping))
         if split * part < 1e-6:
             even, odd = exponential(-decay * part), part * exponential(-decay * part)
         elif damping < 1.0:
@@ -107,22 +113,12 @@ def fill_servo(plant: Array, bandwidth: float, damping: float, part: float) -> N
             left = exponential(-decay * part)
             even, odd = left * cosine, left * sine / split
         else:
-            slow, fast = exponential((split - decay) * part), exponential(-(split + decay) * part)
+            slow = exponential((split - decay) * part)
+            fast = exponential(max(-(split + decay) * part, -700.0))
             even, odd = 0.5 * (slow + fast), 0.5 * (slow - fast) / split
         plant[SERVO], plant[SERVO + 1] = even + decay * odd, odd
         plant[SERVO + 2], plant[SERVO + 3] = -rate * rate * odd, even - decay * odd
-
-
-@inlined
-def fill_calm(plant: Array, bandwidth: float, damping: float, part: float) -> None:
-    """Fill in the rate of the joints' swing, and up to which speed no limit acts on it.
-
-    A servo accelerates by at most rate^2 |e| + 2 damping rate |v|; joints that obey at once change
-    their velocity by at most |v| + rate |e|.
-    """
-    servo = bandwidth > 0.0 and plant[SERVO] != 0.0
-    plant[RATE] = TURN * bandwidth if servo else 1.0 / part
-    gain = plant[RATE] * part * (1.0 + 2.0 * damping) if servo else 2.0
+        plant[RATE], gain = rate, rate * part * (1.0 + 2.0 * damping)
     plant[STEADY] = plant[MOST_CHANGE] / gain
 
 

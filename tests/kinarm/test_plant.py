@@ -66,6 +66,17 @@ def test_servo_follows_its_differential_equation(settings, acceleration):
     np.testing.assert_allclose(path, solved, rtol=0, atol=1e-8)
 
 
+@pytest.mark.parametrize("damping", [100.0, 150.0, 1000.0])
+def test_servos_of_much_damping_creep(damping):
+    simulator, rate = simulator_with(bandwidth=100.0, damping=damping), 2 * np.pi * 100.0
+    actions = np.zeros((12, 5))
+    actions[0, 0] = 0.6
+    path = steps_of(simulator, actions)[:, 0]
+    told, slow = 0.6 * simulator.step_limit[0], rate * (damping - np.sqrt(damping**2 - 1))
+    creeping = told * (1 - np.exp(-slow * 0.02 * np.arange(13)))
+    np.testing.assert_allclose(path, creeping, rtol=0, atol=1e-4 * told)
+
+
 def test_delay_gives_earlier_commands():
     moves = np.random.default_rng(0).uniform(-0.4, 0.4, (12, 5))
     now, late = (steps_of(simulator_with(noise=1e-9, delay=delay), moves) for delay in (0, 3))
