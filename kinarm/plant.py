@@ -78,7 +78,7 @@ class Plant(Checked):
                 raise ProblemError(f"{name} must be a range from low to high, got {lower}, {upper}")
             if lower == 0 < upper and name in ("bandwidth", "acceleration"):
                 raise ProblemError(f"a range of {name} starts above 0, which stands for no limit")
-        if self.acceleration and not self.bandwidth:
+        if self.range_of("acceleration")[1] and not self.range_of("bandwidth")[1]:
             raise ProblemError("acceleration is limited in servos: it needs a bandwidth")
         if self.range_of("delay")[1] > LONGEST_DELAY:
             raise ProblemError(f"delay must be at most {LONGEST_DELAY} steps, got {self.delay}")
@@ -96,8 +96,7 @@ class Plant(Checked):
     @property
     def ideal(self) -> bool:
         """Whether joints are where they are told to be, and so seen."""
-        blank = Plant(damping=self.damping)
-        return self in (blank, Plant(**{**vars(blank), "feedback": "commanded"}))
+        return not any(self.range_of(name)[1] for name in RANGES if name != "damping")
 
     def range_of(self, name: str) -> tuple[float, float]:
         """Lower and upper end of a setting."""

@@ -181,6 +181,7 @@ def test_ideal_plants_change_nothing():
     problem = ReachProblem.load("right")
     assert problem.replace(plant="ideal").digest == problem.digest
     assert Plant(feedback="commanded").ideal
+    assert Plant(delay=(0, 0), bandwidth=(0.0, 0.0), acceleration=(0.0, 0.0)).ideal
     assert not Plant(delay=1).ideal
 
 
@@ -191,6 +192,7 @@ def test_ideal_plants_change_nothing():
         ({"delay": (2, 1)}, "from low to high"),
         ({"bandwidth": (0.0, 5.0)}, "starts above 0"),
         ({"acceleration": 9.0}, "needs a bandwidth"),
+        ({"acceleration": 9.0, "bandwidth": (0.0, 0.0)}, "needs a bandwidth"),
         ({"noise": -0.1}, "noise must not be negative"),
     ],
 )
