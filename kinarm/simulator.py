@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from kinarm.arm import Arm
 from kinarm.episode_runner import EpisodeRunner
-from kinarm.episodes import Control, Episodes, Rollouts
+from kinarm.episodes import TRUNCATED, Control, Episodes, Rollouts
 from kinarm.errors import InvalidInputError, finite_array
 from kinarm.kernels.compiling import Array
 from kinarm.kernels.rollout import results_of_step
@@ -222,7 +222,7 @@ class Simulator(EpisodeRunner):
             Where episodes that go on at these starts had begun [rad or m]:
             random bodies and later goals stay.
         taken : ndarray of int, shape (n,), or int
-            Steps that they have taken before.
+            Steps that they have taken before; after the last one they are over.
         drive : ndarray, shape (n, n_rows, n_actions), optional
             States of their plants; by default the arms rest.
         done : ndarray of int, shape (2, n), optional
@@ -236,6 +236,7 @@ class Simulator(EpisodeRunner):
         self._start(rows, self._stepped(episodes), origins, drive, reached)
         if held is not None:
             episodes.pursuit.held[:] = held
+        episodes.status[episodes.steps >= self.task.horizon] = TRUNCATED
         return episodes
 
     def step(self, episodes: Episodes, actions: ArrayLike) -> StepResult:

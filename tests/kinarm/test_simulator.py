@@ -12,7 +12,7 @@ from simulators import changed
 
 from kinarm.arm import Arm
 from kinarm.envs import ReachEnv
-from kinarm.episodes import COLLISION
+from kinarm.episodes import COLLISION, TRUNCATED
 from kinarm.errors import InvalidInputError, KinarmError, StartInContactError
 from kinarm.kernels.rollout import advance, begin
 from kinarm.kernels.screening import screen
@@ -254,6 +254,17 @@ class TestRefusals:
     def test_of_rollouts(self, simulator, given, message):
         with pytest.raises(InvalidInputError, match=message):
             asked(simulator, **given)
+
+
+def test_an_episode_whose_steps_are_all_taken_is_over(simulator):
+    horizon, goals = simulator.task.horizon, np.tile(FAR_GOAL, (2, 1))
+    taken = np.array([horizon, horizon - 1])
+    episodes = simulator.reset(np.zeros((2, 6)), goals, record=True, taken=taken)
+    for _ in range(2):
+        result = simulator.step(episodes, np.zeros((2, 5)))
+    np.testing.assert_array_equal(episodes.steps, horizon)
+    assert (episodes.status == TRUNCATED).all()
+    assert not result.truncated.any()
 
 
 @pytest.mark.parametrize("dtype", [np.float32, np.float64])
