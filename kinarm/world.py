@@ -134,8 +134,9 @@ class World(GoalKinematics, StepContact):
     def observe(self, configurations: ArrayLike, goals: ArrayLike, step: int = 0) -> Array:
         """Observations of configurations, shape (n, n_observations), also of those in contact.
 
-        They are those of episodes that begin there, after so many steps. Takes joint positions,
-        shape (n, n_joints) [rad or m], and goals, shape (n, goal_width).
+        They are those of episodes that begin there, after so many steps, without a plant's noise
+        and offsets. Takes joint positions, shape (n, n_joints) [rad or m], and goals, shape (n,
+        goal_width).
         """
         return self._begun_at(configurations, goals, step).observation
 
@@ -220,7 +221,11 @@ class World(GoalKinematics, StepContact):
         if not self.has_random_bodies:
             return self._no_scenes
         drawn = self.problem.scene, self._draws, self.arm.chain
-        return drawn_rows(*drawn, starts, np.ascontiguousarray(goals[:, :3]), self.threads)
+        scenes = drawn_rows(*drawn, starts, np.ascontiguousarray(goals[:, :3]), self.threads)
+        shapes, moving = self.contact_model.shapes, list(self.problem.scene.moving)
+        if not len(shapes.moving):  # see `without_moving_bodies`
+            scenes[:, moving, 13:] = shapes.placed[moving, 13:]
+        return scenes
 
     def changed(self, **changes: Any) -> Self:
         """The same world of a problem with other settings of task, plant, observation or stepping.

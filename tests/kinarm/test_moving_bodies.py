@@ -178,6 +178,14 @@ class TestOracle:
         q = random_configurations(changing, 1, 2000)
         np.testing.assert_array_equal(alone.in_contact(q), Simulator(problem()).world.in_contact(q))
 
+    def test_bodies_that_rest_are_all_that_random_scenes_then_have(self, changing):
+        starts, goals = changing.sample(np.random.default_rng(0), 100)
+        actions = np.repeat(np.random.default_rng(1).uniform(-1, 1, (100, 1, 5)), 64, axis=1)
+        still, alone = changing.without_moving_bodies(), Simulator(problem(), threads=1)
+        ends, free = (each.rollout_actions(actions, starts, goals) for each in (still, alone))
+        np.testing.assert_array_equal(ends.configurations, free.configurations)
+        assert still.contact_pairs(ends) == alone.contact_pairs(free)
+
 
 class TestPictures:
     def test_recordings_and_pages_show_what_was_there(self, changing):
