@@ -116,7 +116,7 @@ POLAR = (1, -1, 1)
 """Signs of a vector in the reflection y -> -y."""
 
 UNIT = 1 + 1e-6
-"""Largest entry of a unit vector, to within rounding."""
+"""Largest entry of a unit vector or an action, to within rounding."""
 
 
 def _rest_parts(
@@ -226,7 +226,7 @@ OBSERVATION = (
         meaning="last action, clipped; zeros at the start",
         unit="1",
         signs=(0,),
-        bounds=lambda _: (-1.0, 1.0),
+        bounds=lambda _: (-UNIT, UNIT),
         write=_write_action,
         of=ACTUATED,
     ),

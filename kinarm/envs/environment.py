@@ -84,7 +84,8 @@ def state_bounds(simulator: Simulator) -> tuple[Array, Array]:
     task, arm, plant = simulator.task, simulator.arm, simulator.problem.plant
     most = {name: plant.range_of(name)[1] for name in RANGES}
     noise, resolution = MOST_NOISE * most["noise"], most["resolution"]
-    off = noise + resolution + most["bias"] + most["calibration"]
+    leap = resolution + most["calibration"]  # of a first command, which is within the limits
+    off = noise + leap + most["bias"]
     missed = task.tolerance + most["goal_bias"] + MOST_NOISE * most["goal_noise"]
     goal_lower, goal_upper = simulator.world.goal_bounds
     ranges = Ranges(
@@ -93,7 +94,7 @@ def state_bounds(simulator: Simulator) -> tuple[Array, Array]:
         reach=arm.reach,
         lower=arm.lower - off,
         upper=arm.upper + off,
-        fastest=UNIT + (2 * noise + resolution) / simulator.step_limit,
+        fastest=UNIT + (2 * noise + leap) / simulator.step_limit,
     )
     return simulator.world.layout.bounds(ranges)
 

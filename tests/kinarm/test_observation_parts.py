@@ -263,6 +263,22 @@ class TestBounds:
         assert (seen >= low).all()
         assert (seen <= high).all()
 
+    def test_contain_first_commands_and_actions_of_a_shield(self):
+        from kinarm.envs.environment import state_bounds
+
+        plant = Plant(delay=(0, 2), calibration=0.2, feedback="commanded")
+        parts = ("joint_velocities", "last_action", "commanded")
+        simulator = simulator_of(parts, plant=plant, shield=True)
+        starts, goals = simulator.sample(np.random.default_rng(0), 80)
+        starts[:, 0] = simulator.arm.lower[0]
+        free = ~simulator.world.in_contact(starts)
+        actions = held_actions(simulator, np.random.default_rng(1), 80)[free, :20]
+        actions[:, 0, 0] = 1.0
+        low, high = state_bounds(simulator)
+        seen = stepped(simulator, starts[free], goals[free], actions)
+        assert (seen >= low).all()
+        assert (seen <= high).all()
+
 
 class TestProblem:
     def test_the_papers_list_is_the_default(self):
