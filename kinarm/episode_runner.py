@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from kinarm._parallel import one_torch_thread, run_together
-from kinarm.episodes import PAUSED, RUNNING, Control, Episodes
+from kinarm.episodes import PAUSED, RUNNING, TRUNCATED, Control, Episodes
 from kinarm.errors import StartInContactError, finite_array
 from kinarm.kernels.compiling import Array
 from kinarm.kernels.rollout import advance, allow_one_step, begin, refuse
@@ -44,6 +44,17 @@ class EpisodeRunner:
         """Start episodes of some rows, in place, at their ``q`` and ``goal``."""
         episodes.steps[rows] = 0
         self._start(rows, self._stepped(episodes))
+
+    def go_on(self, episodes: Episodes, rows: NDArray[np.int64]) -> None:
+        """Let episodes go on whose last step was refused: the arm rests, and sees that."""
+        before, session = episodes.observation[rows], self._stepped(episodes)
+        run_together(begin, len(rows), self.threads, session.of_thread, rows)
+        late = episodes.steps[rows] >= self.world.rules.horizon
+        episodes.status[rows] = np.where(late, TRUNCATED, RUNNING)
+        seen, layout = episodes.observation, self.world.layout
+        seen[rows, layout.width :] = before[:, : -layout.width]
+        if (place := layout.places.get("last_action")) is not None:
+            seen[rows, place] = np.clip(session.control.actions[rows, 0], -1.0, 1.0)
 
     def _refilled(
         self, control: Control, starts: Array, goals: Array, shift: Array | None

@@ -44,15 +44,11 @@ def low_discrepancy_points(count: int, dimensions: int) -> NDArray[np.float64]:
     They are multiples of powers of a root of x^(d + 1) = x + 1, modulo 1; for d = 1, of the golden
     ratio (Roberts 2018). All callers share them, and do not change them.
     """
-    return (0.5 + np.arange(1, count + 1)[:, None] * _strides(dimensions)) % 1.0
-
-
-@cache
-def _strides(dimensions: int) -> NDArray[np.float64]:
-    """Powers of the root; libraries that compute them in floats differ in the last bits."""
+    # Libraries that compute powers in floats differ in the last bits.
     context, root = Context(prec=28), Decimal(2)
     exponent = context.divide(Decimal(1), Decimal(dimensions + 1))
     for _ in range(64):
         root = context.power(context.add(root, 1), exponent)
     root = Decimal(float(root))
-    return np.array([float(context.power(root, -k)) for k in range(1, dimensions + 1)])
+    strides = np.array([float(context.power(root, -k)) for k in range(1, dimensions + 1)])
+    return (0.5 + np.arange(1, count + 1)[:, None] * strides) % 1.0

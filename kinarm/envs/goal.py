@@ -18,7 +18,7 @@ from kinarm.envs.environment import (
 )
 from kinarm.envs.reach import ReachEnv
 from kinarm.envs.vector import ReachVectorEnv
-from kinarm.episodes import RUNNING, TRUNCATED, Episodes
+from kinarm.episodes import TRUNCATED, Episodes
 from kinarm.errors import InvalidInputError
 from kinarm.goals import REST_PARTS
 from kinarm.simulator import Simulator, StepResult
@@ -126,9 +126,7 @@ class GoalInterface(GoalRewards, Interface):
         """Reward by the goals; episodes go on after a refused move."""
         truncated = result.truncated
         if np.count_nonzero(result.collision):
-            rows = result.collision.nonzero()[0]
-            over = episodes.steps[rows] >= self.simulator.task.horizon
-            episodes.status[rows] = np.where(over, TRUNCATED, RUNNING)
+            self.simulator.go_on(episodes, result.collision.nonzero()[0])
             truncated = truncated | (episodes.status == TRUNCATED) & result.collision
         info = {"collision": result.collision}
         reward = self.compute_reward(*self._goals(episodes.observation), info)

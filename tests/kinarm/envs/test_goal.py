@@ -6,6 +6,7 @@ import pytest
 
 from kinarm.envs.goal import ReachGoalEnv, ReachGoalVectorEnv
 from kinarm.envs.reach import ReachEnv
+from kinarm.kernels.plant import COMMAND
 
 NAMES = [f"kinarm/ReachGoal{task}-v0" for task in ("Left", "Right", "Both")]
 HOME = np.zeros(6)
@@ -124,6 +125,32 @@ def test_after_a_refused_move_contact_is_still_found():
             env.reset()
             refused = 0
     assert compared > 500
+
+
+def test_after_a_refused_move_the_arm_sees_that_it_rests():
+    parts = ("goal", "goal_minus_tool", "joint_velocities", "last_action", "commanded", "time_left")
+    env = ReachGoalEnv("both", plant="hard", observation={"parts": parts, "history": 2}, horizon=40)
+    layout, rng, refused = env.simulator.world.layout, np.random.default_rng(0), 0
+    for seed in range(12):
+        env.reset(seed=seed)
+        pushed, ended = np.sign(rng.uniform(-1, 1, 5)), False
+        while not ended:
+            action = pushed * rng.uniform(0, 1, 5)
+            observation, _, terminated, ended, info = env.step(action)
+            assert not terminated
+            if not info["collision"]:
+                continue
+            state, steps = env.episodes, int(env.episodes.steps[0])
+            now, before = state.observation[0].reshape(2, layout.width)
+            seen = {name: now[place] for name, place in layout.places.items()}
+            assert seen["time_left"] == (40 - steps) / 40
+            assert before[layout.places["time_left"]] == (41 - steps) / 40
+            np.testing.assert_array_equal(seen["commanded"][:5], state.drive[0, COMMAND])
+            np.testing.assert_array_equal(seen["last_action"], action)
+            assert not seen["joint_velocities"].any()
+            np.testing.assert_array_equal(observation["desired_goal"], seen["goal"])
+            refused += 1
+    assert refused > 50
 
 
 def test_batch_equals_single_environments():
