@@ -1,7 +1,8 @@
 """The plant: what lies between commands and joints, and between joints and what is seen."""
 
 from dataclasses import dataclass, field, fields
-from typing import Any, Literal
+from pathlib import Path
+from typing import Literal
 
 from kinarm._fields import OPTIONAL, Checked, from_plain, read_toml
 from kinarm._files import named_file, shipped_files
@@ -86,7 +87,7 @@ class Plant(Checked):
             raise ProblemError(f"bandwidth must be at most {FASTEST_SERVO:g} Hz")
 
     @classmethod
-    def load(cls, plant: "PlantLike") -> "Plant":
+    def load(cls, plant: "Plant | str | Path") -> "Plant":
         """Find a plant by name, such as ``"hard"``, or read it from a TOML file."""
         if isinstance(plant, Plant):
             return plant
@@ -114,7 +115,3 @@ RANGES = tuple(item.name for item in fields(Plant) if item.name != "feedback")
 def plant_names() -> tuple[str, ...]:
     """Names of the plants that ship."""
     return tuple(shipped_files("plants"))
-
-
-PlantLike = Plant | str | Any
-"""A plant, its name or its file."""

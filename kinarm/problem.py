@@ -133,6 +133,9 @@ class ReachProblem(Checked):
                 changes[name] = find(changes[name])
         if isinstance(changes.get("task"), str | Path):
             changes["task"] = ReachProblem.load(changes["task"]).task
+        for part in ("task", "stepping", "plant"):
+            if isinstance(changes.get(part), Mapping):
+                changes[part] = from_plain(type(getattr(self, part)), changes[part], part)
         if "observation" in changes:
             changes["observation"] = self.observation.changed(changes["observation"])
         task = changes.get("task", self.task)

@@ -46,9 +46,9 @@ def low_discrepancy_points(count: int, dimensions: int) -> NDArray[np.float64]:
     """
     # Libraries that compute powers in floats differ in the last bits.
     context, root = Context(prec=28), Decimal(2)
-    exponent = context.divide(Decimal(1), Decimal(dimensions + 1))
     for _ in range(64):
-        root = context.power(context.add(root, 1), exponent)
+        root = context.power(context.add(root, 1), context.divide(1, dimensions + 1))
     root = Decimal(float(root))
-    strides = np.array([float(context.power(root, -k)) for k in range(1, dimensions + 1)])
-    return (0.5 + np.arange(1, count + 1)[:, None] * strides) % 1.0
+    powers = [float(context.power(root, -k)) for k in range(1, dimensions + 1)]
+    points: NDArray[np.float64] = 0.5 + np.arange(1, count + 1)[:, None] * np.array(powers)
+    return points % 1.0

@@ -1,6 +1,7 @@
 """The simulator: a problem, stepped in batches of episodes, and what a step gives."""
 
 from copy import copy
+from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
@@ -14,7 +15,7 @@ from kinarm.kernels.compiling import Array
 from kinarm.kernels.rollout import results_of_step
 from kinarm.networks import CompiledPolicy, Networks, PolicyFunction, network_control
 from kinarm.observation_choice import Observation
-from kinarm.plant import PlantLike
+from kinarm.plant import Plant
 from kinarm.problem import ProblemLike, ReachProblem
 from kinarm.scenarios import draw_scenarios
 from kinarm.scene import Scene
@@ -167,7 +168,7 @@ class Simulator(EpisodeRunner):
         """The simulator of one episode; see `kinarm.World.in_scene`."""
         return self._in(self.world.in_scene(start, goal))
 
-    def with_plant(self, plant: PlantLike) -> "Simulator":
+    def with_plant(self, plant: Plant | str | Path) -> "Simulator":
         """Another simulator of the same world with another plant, itself, its name or file."""
         return self._in(self.world.changed(plant=plant))
 

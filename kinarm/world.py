@@ -134,9 +134,8 @@ class World(GoalKinematics, StepContact):
     def observe(self, configurations: ArrayLike, goals: ArrayLike, step: int = 0) -> Array:
         """Observations of configurations, shape (n, n_observations), also of those in contact.
 
-        They are those of episodes that begin there, after so many steps, without a plant's noise
-        and offsets. Takes joint positions, shape (n, n_joints) [rad or m], and goals, shape (n,
-        goal_width).
+        They are those of episodes that begin there, after so many steps, if plants are ideal. Takes
+        joint positions, shape (n, n_joints) [rad or m], and goals, shape (n, goal_width).
         """
         return self._begun_at(configurations, goals, step).observation
 

@@ -17,7 +17,6 @@ import numpy as np
 from kinarm import Plant, ReachProblem, Scene
 from kinarm.errors import InvalidInputError, RunStoppedError
 from kinarm.kernels.compiling import Array
-from kinarm.plant import PlantLike
 from kinarm.policies.running.backend import WiredArm
 from kinarm.policies.running.check import ContractCheck
 from kinarm.policies.running.fake import FakeArm
@@ -48,7 +47,7 @@ class FaultyArm(FakeArm):
         world: World,
         start: Array,
         *,
-        plant: PlantLike = "ideal",
+        plant: Plant | str = "ideal",
         reads: Distortion = np.copy,
         takes: Distortion = np.copy,
     ) -> None:

@@ -7,7 +7,7 @@ from kinarm.goals import GoalSpecification
 from kinarm.kernels.compiling import Array
 from kinarm.kernels.plant import COMMAND
 from kinarm.observation_choice import Observation
-from kinarm.plant import Plant, PlantLike
+from kinarm.plant import Plant
 from kinarm.policies.running.backend import SimulatedArm
 from kinarm.simulator import Simulator
 from kinarm.task import LONGEST_HORIZON, NEVER, RewardWeights
@@ -30,7 +30,7 @@ class FakeArm(SimulatedArm):
         What lies between command and joint; each period is a step of it.
     """
 
-    def __init__(self, world: World, start: Array, *, plant: PlantLike = "ideal") -> None:
+    def __init__(self, world: World, start: Array, *, plant: Plant | str = "ideal") -> None:
         self.joint_names, self.time, self.period = world.arm.joint_names, 0.0, 0.0
         self.start = np.array(start, dtype=float)
         self._problem, self._plant = world.problem, Plant.load(plant)

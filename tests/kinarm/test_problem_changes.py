@@ -5,12 +5,13 @@ import dataclasses
 import pytest
 
 from kinarm.arm import Arm, ArmSpecification
-from kinarm.errors import ArmError, ProblemError, UnknownNameError
+from kinarm.errors import ArmError, InvalidInputError, ProblemError, UnknownNameError
+from kinarm.plant import Plant
 from kinarm.problem import PROBLEMS, ReachProblem
 from kinarm.problem_options import ProblemOptions, say_choices
 from kinarm.scene import Scene
 from kinarm.simulator import Simulator
-from kinarm.task import RewardWeights, Stepping
+from kinarm.task import ReachTask, RewardWeights, Stepping
 
 RIGHT = PROBLEMS["right"]
 
@@ -24,6 +25,18 @@ class TestReplace:
         assert RIGHT.replace(scene="left").scene == Scene()
         changed = RIGHT.replace(stepping=Stepping(time_step=0.1), tested_configurations=2)
         assert changed.stepping == Stepping(time_step=0.1, tested_configurations=2)
+
+    def test_a_part_as_a_mapping_beside_its_fields(self):
+        changed = RIGHT.replace(plant={"noise": 0.1}, delay=2, stepping={"time_step": 0.1})
+        assert changed.plant == Plant(noise=0.1, delay=2)
+        assert changed.stepping == Stepping(time_step=0.1, tested_configurations=0)
+        task = RIGHT.replace(task={"tolerance": 0.1}, horizon=3, reward={"success": 1}).task
+        assert task == ReachTask(
+            goal_regions=("right", "left"),
+            tolerance=0.1,
+            horizon=3,
+            reward=RewardWeights(success=1),
+        )
 
     def test_changes_are_told_also_if_they_lead_to_defaults(self):
         assert PROBLEMS["both"].changes == []
@@ -62,6 +75,7 @@ class TestReplace:
                 "setting of a problem 'horizons' .did you mean 'horizon'",
             ),
             ({"reward": {"bonus": 1}}, UnknownNameError, "reward term 'bonus'; available: prog"),
+            ({"plant": {"noises": 1}}, InvalidInputError, "^plant: unknown key 'noises' .did you"),
             ({"scene": Scene(goal_regions=())}, ProblemError, "needs at least one goal region"),
         ],
     )
