@@ -128,9 +128,11 @@ class ObservationLayout(NamedTuple):
         if set(given) != set(GOAL_KEYS):
             wanted, found = (", ".join(map(str, keys)) for keys in (GOAL_KEYS, given))
             raise InvalidInputError(f"a dictionary observation has the keys {wanted}, got {found}")
-        if self.history > 1:
-            raise InvalidInputError("a policy with a history needs a flat observation")
         (goals, offsets), entries = self.goal_entries, self.entries(of_goal=False)
+        if len(goals) + len(offsets) + len(entries) < self.size:
+            raise InvalidInputError(
+                "a policy that sees resolved_rate or a history needs a flat observation"
+            )
         batch = np.shape(given["desired_goal"])[:-1]
         rows = (None,) * len(batch)
         goal, tool = (

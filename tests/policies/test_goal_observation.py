@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 
-from kinarm.envs.goal import GoalInterface
+from kinarm.envs.goal import GoalInterface, ReachGoalEnv
 from kinarm.errors import InvalidInputError
+from kinarm.policies import load_policy
 
 
 @pytest.fixture
@@ -26,6 +27,14 @@ def test_arms_of_other_joints(any_simulator):
     parts = GoalInterface(any_simulator).observe(flat)
     layout = any_simulator.world.layout
     np.testing.assert_allclose(layout.flat(parts), flat, rtol=0, atol=1e-15)
+
+
+def test_what_a_dictionary_lacks_is_not_made_up():
+    """Resolved-rate control depends on the goal, and is in none of the entries."""
+    policy = load_policy("ppo-best-both-seed0")
+    shown, _ = ReachGoalEnv("both", observation=policy.observation).reset(seed=0)
+    with pytest.raises(InvalidInputError, match="resolved_rate or a history needs a flat"):
+        policy.predict(shown)
 
 
 @pytest.mark.parametrize(
