@@ -141,7 +141,7 @@ class ContactModel:
             geometry.addCollisionPair(pin.CollisionPair(*pair))
         names = (*body_names(arm), *surroundings)
         last = fixed + sum(each.count[1] for each in scene.random_bodies)
-        anywhere = range(n_shapes if loose else fixed, last)
+        anywhere = {*placed, *range(fixed, last), *(n_shapes + k for k in scene.moving)}
         dropped = uninformative_pairs(arm, geometry, n_shapes, names, anywhere)
         kept = [pair for index, pair in enumerate(candidates) if index not in dropped]
         geometry.removeAllCollisionPairs()

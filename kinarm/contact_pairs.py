@@ -2,7 +2,7 @@
 
 import warnings
 from collections import Counter
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable
 from itertools import combinations, product
 
 import coal
@@ -100,7 +100,7 @@ def uninformative_pairs(
     geometry: pin.GeometryModel,
     n_shapes: int,
     names: tuple[str, ...],
-    anywhere: range,
+    anywhere: Collection[int],
 ) -> dict[int, str]:
     """Pairs within the arm that touch at home, and of the mounting, with reasons.
 

@@ -140,6 +140,20 @@ class TestEpisodes:
         assert world.contact_pair(start[0], start[0], step=steps - 2) is None
         assert world.contact_pair(start[0], start[0], step=steps - 1)[1] == "ball"
 
+    def test_what_moves_meets_the_first_link(self):
+        """Where it begins, the first link never touches it, wherever its joint is."""
+        ram = Body(
+            name="ram",
+            shape="box",
+            size=(0.1, 0.1, 0.1),
+            position=(1.2, 0.0, 0.17),
+            motion=BodyMotion(velocity=(-2.0, 0.0, 0.0)),
+        )
+        simulator = Simulator(problem(ram), threads=1)
+        start, goal = np.array([(0, -0.5, 0.3, 0, 0, 0)]), np.array([(0.0, 0.65, 0.325)])
+        rollouts = simulator.rollout_actions(np.zeros((1, 64, 5)), start, goal)
+        assert simulator.contact_pairs(rollouts) == (("shoulder", "ram"),)
+
     def test_go_on_where_bodies_are_by_then(self, passing):
         rest, goal = np.zeros((1, 5)), np.array([(0.0, 0.65, 0.325)])
         whole = passing.reset(np.zeros((1, 6)), goal)
