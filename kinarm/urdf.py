@@ -126,8 +126,8 @@ def _reduced(path: Path, specification: ArmSpecification) -> Description:
         if named_parts.count(body.name) > 1:
             raise ArmError(f"held body {body.name!r} needs a name of its own")
     _check_mimics([joints[name] for name in kept])
-    for name in kept:
-        notes += _bounded(joints[name], limits)
+    for name in dict.fromkeys((*kept, *limits)):
+        notes += _bounded(joints[name], limits.get(name))
     held = _held_positions(joints, moving, kept, asked)
     for name, position in held.items():
         _fix(joints[name], position)
@@ -176,24 +176,21 @@ def _check_mimics(chain: list[TreeJoint]) -> None:
             )
 
 
-def _bounded(joint: TreeJoint, limits: Mapping[str, tuple[float, float]]) -> tuple[str, ...]:
-    """Check a kept joint's limits; return what was chosen."""
-    element, name = joint.element, joint.name
-    limit = element.find("limit")
-    notes: tuple[str, ...] = ()
+def _bounded(joint: TreeJoint, ends: tuple[float, float] | None) -> tuple[str, ...]:
+    """Give a joint other limits, if there are some, and check them; return what was chosen."""
+    element, name, notes = joint.element, joint.name, tuple[str, ...]()
     if joint.kind == "continuous":
         element.set("type", "revolute")
-        if limit is None:
-            limit = ElementTree.SubElement(element, "limit", effort="0")
-        if name not in limits:
-            limit.set("lower", repr(-math.pi))
-            limit.set("upper", repr(math.pi))
+        if ends is None:
+            ends = -math.pi, math.pi
             notes = (f"joint {name!r} is continuous: its range is taken as -180 to 180 deg",)
+    limit = element.find("limit")
     if limit is None:
-        raise ArmError(f"joint {name!r} has no limits")
-    if name in limits:
-        for end, value in zip(("lower", "upper"), limits[name], strict=True):
-            limit.set(end, repr(value))
+        if ends is None:
+            raise ArmError(f"joint {name!r} has no limits")
+        limit = ElementTree.SubElement(element, "limit", effort="0")
+    if ends is not None:
+        limit.attrib |= {"lower": repr(ends[0]), "upper": repr(ends[1])}
     lower, upper = (float(limit.attrib[end]) for end in ("lower", "upper"))
     if not -FARTHEST_POSITION <= lower < upper <= FARTHEST_POSITION:
         raise ArmError(f"joint {name!r} has no usable limits: {lower}..{upper}")
@@ -225,7 +222,7 @@ def _held_positions(
 def _near_zero(joint: TreeJoint) -> float:
     """Position closest to zero within a joint's limits, if any."""
     limit = joint.element.find("limit")
-    if limit is None or joint.kind == "continuous":
+    if limit is None or joint.element.get("type") == "continuous":
         return 0.0
     return min(max(0.0, float(limit.attrib["lower"])), float(limit.attrib["upper"]))
 

@@ -98,6 +98,18 @@ class TestMimickingJoints:
         assert Arm.load(path, held={"open_b": 0.3}).description.held["open_b"] == 0.3
 
 
+class TestGivenLimits:
+    def test_stand_in_for_those_that_are_missing(self, make_joint, write_robot):
+        path = write_robot([make_joint(limit="")])
+        arm = Arm.load(path, limits={"joint_1": (-1.0, 2.0)}, velocity_limits=[2])
+        assert (arm.lower[0], arm.upper[0], arm.velocity_limits[0]) == (-1, 2, 2)
+
+    def test_say_where_joints_stay_that_do_not_carry_the_tool(self, make_joint, write_robot):
+        path = write_robot([make_joint()], extra=gripper())
+        held = Arm.load(path, limits={"open_a": (0.02, 0.03)}).description.held
+        assert held["open_a"] == 0.02
+
+
 class TestContinuousJoints:
     def test_get_a_turn_and_a_note_or_the_limits_that_are_given(self, make_joint, write_robot):
         limit = '<limit velocity="1" effort="0"/>'
