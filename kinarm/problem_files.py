@@ -64,7 +64,7 @@ def find_scene(name: str | Path) -> Scene:
     of_problem = str(name) in shipped_files("problems") and str(name) not in scene_names()
     path = named_file("problem" if of_problem else "scene", name, problem_names())
     entries = read_toml(path, "scene")
-    if entries.keys() & KEYS:
+    if entries and entries.keys() <= KEYS:
         return from_plain(Scene, read_problem(path).get("scene", {}), str(path), "scene.")
     if "goal_regions" not in entries:
         raise InvalidInputError(f"{path}: 'goal_regions' is missing: where goals may lie")

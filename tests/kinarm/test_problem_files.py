@@ -178,6 +178,7 @@ class TestScenesAndTasks:
         [
             ("ground = true", "'goal_regions' is missing"),
             (BOX.replace("yaw = 0.5", "yaw = inf"), "yaw"),
+            ('name = "mine"\n' + BOX, "unknown key 'name'"),
         ],
     )
     def test_unusable_scenes_name_file_and_key(self, write, text, message):
