@@ -93,7 +93,8 @@ def draw_for_each(
         if pending.size == 0:
             shape = len(rngs), count
             return starts.reshape(*shape, arm.n_joints), goals.reshape(*shape, world.goal_width)
-    pair = world.contact_model.contact_pair(starts[pending[0]])
+    start, goal = starts[pending[0]], goals[pending[0]]
+    pair = world.in_scene(start, goal).contact_pair(start)
     reason = f"{pair[0]} touches {pair[1]}" if pair else "the tool already is at the goal"
     if solved and missed.any():
         reason = "nothing free of contact is found at the goal"

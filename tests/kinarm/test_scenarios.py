@@ -10,6 +10,7 @@ from scipy import stats
 from simulators import changed
 
 from kinarm.arm import ArmSpecification
+from kinarm.bodies import RandomBodies
 from kinarm.errors import InvalidInputError, ProblemError
 from kinarm.problem import PROBLEMS, ReachProblem
 from kinarm.scene import GoalRegion, Obstacle, Scene
@@ -63,6 +64,14 @@ def test_box_where_the_arm_starts_leaves_no_start(simulator):
     block = Obstacle(name="block", lower=(0.5, -0.1, 0.6), upper=(0.7, 0.1, 0.8))
     buried = changed(simulator, scene=Scene(obstacles=(block,)), start_spread=0)
     with pytest.raises(ProblemError, match="no contact-free start .* touches block"):
+        buried.sample(np.random.default_rng(23), 3)
+
+
+def test_random_body_where_the_arm_starts_is_named(simulator):
+    there = {"lower": (0.6, 0.0, 0.7), "upper": (0.6, 0.0, 0.7)}
+    ball = RandomBodies(name="ball", shape="sphere", smallest=(0.2,), largest=(0.2,), **there)
+    buried = changed(simulator, scene=Scene(random_bodies=(ball,)), start_spread=0)
+    with pytest.raises(ProblemError, match="no contact-free start .* touches ball 1"):
         buried.sample(np.random.default_rng(23), 3)
 
 
