@@ -28,6 +28,9 @@ from kinarm.task import ReachTask, Stepping
 if TYPE_CHECKING:
     from kinarm.arm import Arm
 
+PARTS = {"task": ReachTask, "stepping": Stepping, "plant": Plant}
+"""Parts of a problem whose settings `ReachProblem.replace` takes by name."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class ReachProblem(Checked):
@@ -114,13 +117,13 @@ class ReachProblem(Checked):
         **overrides
             ``name``; ``arm`` (a name, a path or a specification), ``scene`` and
             ``task`` (by name, of a file, of another problem, or themselves),
-            ``stepping``; ``plant`` (by name, of a file, or itself);
-            ``observation`` (itself, a list of parts, or a mapping of what
-            changes); ``reward`` and ``goal`` (themselves, or a mapping of what
-            changes); or any field of task, stepping or plant, such as
-            ``tolerance``. None changes nothing. With another scene, by name or
-            file, that lacks a goal region of the task, all its regions are to be
-            reached.
+            ``stepping``; ``plant`` (by name, of a file, or itself); of these four
+            also a mapping, beside which defaults hold; ``observation`` (itself, a
+            list of parts, or a mapping of what changes); ``reward`` and ``goal``
+            (themselves, or a mapping of what changes); or any field of task,
+            stepping or plant, such as ``tolerance``. None changes nothing. With
+            another scene, by name or file, that lacks a goal region of the task, all
+            its regions are to be reached, unless the task is given as itself.
         """
         given = {name: value for name, value in overrides.items() if value is not None}
         if not given:
@@ -133,13 +136,14 @@ class ReachProblem(Checked):
                 changes[name] = find(changes[name])
         if isinstance(changes.get("task"), str | Path):
             changes["task"] = ReachProblem.load(changes["task"]).task
-        for part in ("task", "stepping", "plant"):
-            if isinstance(changes.get(part), Mapping):
-                changes[part] = from_plain(type(getattr(self, part)), changes[part], part)
+        for part, kind in PARTS.items():
+            if part in changes and not isinstance(changes[part], kind):
+                changes[part] = from_plain(kind, changes[part], "problem", f"{part}.")
         if "observation" in changes:
             changes["observation"] = self.observation.changed(changes["observation"])
         task = changes.get("task", self.task)
-        if isinstance(overrides.get("scene"), str | Path) and "task" not in changes:
+        named = isinstance(overrides.get("scene"), str | Path)
+        if named and isinstance(overrides.get("task"), str | Path | None):
             regions = {region.name for region in changes["scene"].goal_regions}
             if not regions.issuperset(task.goal_regions):
                 task = changes["task"] = replace(task, goal_regions=(), goal_weights=())
@@ -148,11 +152,10 @@ class ReachProblem(Checked):
                 of_part, own = dict(given[name]), getattr(task, name)
                 _check_names(what, of_part, type(own))
                 given[name] = replace(own, **of_part)
-        for part, whole in (("task", task), ("stepping", self.stepping), ("plant", self.plant)):
-            whole = changes.get(part, whole)
-            if own := _taken(given, type(getattr(self, part))):
-                changes[part] = replace(whole, **own)
-        _check_names("setting of a problem", given, ReachProblem, ReachTask, Stepping, Plant)
+        for part, kind in PARTS.items():
+            if own := _taken(given, kind):
+                changes[part] = replace(changes.get(part, getattr(self, part)), **own)
+        _check_names("setting of a problem", given, ReachProblem, *PARTS.values())
         return replace(self, **changes)
 
     def body_offsets(self, taken: NDArray[np.int64]) -> NDArray[np.float64]:
@@ -200,7 +203,7 @@ class ReachProblem(Checked):
         shipped = self.name in problem_names()
         base = ReachProblem.load(self.name) if shipped else self.replace(plant=Plant())
         found = []
-        for part in ("task", "stepping", "plant"):
+        for part in PARTS:
             ours, theirs = getattr(self, part), getattr(base, part)
             values = ((name, getattr(ours, name)) for name in init_fields(type(ours)))
             changed = [(name, value) for name, value in values if getattr(theirs, name) != value]

@@ -26,17 +26,12 @@ class TestReplace:
         changed = RIGHT.replace(stepping=Stepping(time_step=0.1), tested_configurations=2)
         assert changed.stepping == Stepping(time_step=0.1, tested_configurations=2)
 
-    def test_a_part_as_a_mapping_beside_its_fields(self):
-        changed = RIGHT.replace(plant={"noise": 0.1}, delay=2, stepping={"time_step": 0.1})
-        assert changed.plant == Plant(noise=0.1, delay=2)
-        assert changed.stepping == Stepping(time_step=0.1, tested_configurations=0)
-        task = RIGHT.replace(task={"tolerance": 0.1}, horizon=3, reward={"success": 1}).task
-        assert task == ReachTask(
-            goal_regions=("right", "left"),
-            tolerance=0.1,
-            horizon=3,
-            reward=RewardWeights(success=1),
-        )
+    def test_parts_as_mappings_beside_settings(self):
+        changed = RIGHT.replace(plant={"noise": 0.01}, delay=2)
+        assert changed.plant == Plant(noise=0.01, delay=2)
+        changed = RIGHT.replace(task={"tolerance": 0.1}, reward={"success": 1.0}, scene="table")
+        assert changed.task.reward == RewardWeights(success=1)
+        assert changed.task.goal_regions == ("table",)
 
     def test_changes_are_told_also_if_they_lead_to_defaults(self):
         assert PROBLEMS["both"].changes == []
@@ -74,8 +69,13 @@ class TestReplace:
                 UnknownNameError,
                 "setting of a problem 'horizons' .did you mean 'horizon'",
             ),
+            (
+                {"stepping": "fast", "time_step": 0.1},
+                InvalidInputError,
+                "stepping must be a table, got 'fast'",
+            ),
             ({"reward": {"bonus": 1}}, UnknownNameError, "reward term 'bonus'; available: prog"),
-            ({"plant": {"noises": 1}}, InvalidInputError, "^plant: unknown key 'noises' .did you"),
+            ({"plant": {"noises": 1}}, InvalidInputError, "problem: unknown key 'plant.noises'"),
             ({"scene": Scene(goal_regions=())}, ProblemError, "needs at least one goal region"),
         ],
     )
@@ -115,6 +115,10 @@ class TestOptions:
         problem = ProblemOptions(scene="table").resolve("both")
         assert problem.task.goal_regions == ("table",)
         assert problem.name == "both"
+
+    def test_a_scene_brings_its_goals_also_beside_a_task(self):
+        options = ProblemOptions(problem="right", task="both", scene="table")
+        assert options.resolve().task.goal_regions == ("table",)
 
     def test_choices_are_said_once_an_arm(self, make_joint, write_robot, capsys):
         path = str(write_robot([make_joint("prismatic")], tool=None))
