@@ -117,6 +117,8 @@ class ArmSpecification(Checked):
         if file is None:
             return self
         below = file.arm.completed()
+        if self.tool_frame not in (None, below.tool_frame):
+            below = replace(below, tool_offset=None)  # which is one in the other frame
         given = {name: getattr(self, name) for name in init_fields(type(self)) if name != "source"}
         given = {name: value for name, value in given.items() if value is not None}
         if not self.package_dirs:

@@ -3,7 +3,7 @@
 import sys
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, ClassVar, Literal
+from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
 from kinarm._fields import Checked, init_fields
 from kinarm.arm_specification import arm_names
@@ -99,8 +99,9 @@ class ProblemOptions(Checked):
         """The arm that the options name or change, or None."""
         from kinarm.arm import Arm  # loads Pinocchio, unlike --help
 
-        given = {"tool_frame": self.tool_frame, "package_dirs": self.package_dirs or None}
-        given = {name: value for name, value in given.items() if value is not None}
+        given: dict[str, Any] = {"package_dirs": self.package_dirs} if self.package_dirs else {}
+        if self.tool_frame is not None:
+            given |= {"tool_frame": self.tool_frame, "tool_offset": None}
         if self.arm is not None:
             return Arm.load(self.arm, **given)
         return Arm.load(replace(problem.arm, digest=None), **given) if given else None

@@ -9,6 +9,8 @@ from kinarm.arm import Arm
 from kinarm.arm_specification import AllowedContact, ArmFile, ArmSpecification, arm_names
 from kinarm.collision import ContactModel
 from kinarm.errors import ArmError, InvalidInputError, UnknownNameError
+from kinarm.problem import ReachProblem
+from kinarm.problem_options import ProblemOptions
 from kinarm.scene import Scene
 
 AXIS_NAMES = tuple(f"axis_{number}" for number in range(1, 7))
@@ -60,6 +62,20 @@ class TestArmFiles:
         np.testing.assert_array_equal(arm.lower[:2], [-1, -0.5])
         assert arm.n_joints == 5
         assert arm.name == "mine"
+
+    def test_an_offset_is_one_in_the_files_own_tool_frame(self, tmp_path):
+        path = self.write(
+            tmp_path,
+            '[arm]\nsource = "paper"\ntool_frame = "hand"\ntool_offset = [0.0, 0.0, 0.1]',
+        )
+        wrist, own = Arm.load("paper", tool_frame="wrist"), Arm.load(path, tool_frame="wrist")
+        assert own.digest == wrist.digest
+        problem = ReachProblem.load("right").replace(arm=str(path))
+        chosen = ProblemOptions(tool_frame="wrist").resolve(problem).load_arm()
+        assert chosen.digest == wrist.digest
+        pointing = ArmSpecification(source="paper", tool_offset=(0.0, 0.0, 0.1))
+        chosen = ProblemOptions(tool_frame="wrist").resolve(problem.replace(arm=pointing))
+        assert chosen.arm_digest == wrist.digest
 
     def test_source_and_folders_start_at_the_file(self, tmp_path, shipped_arms, monkeypatch):
         urdf = shipped_arms["paper"].description.path.read_text()
