@@ -111,10 +111,10 @@ class Arm:
             allowed_contacts=wanted.allowed_contacts or (),
             chain=chain,
         )
-        if specification.digest not in (None, loaded.digest):
+        if wanted.digest not in (None, loaded.digest):
             raise ArmError(
                 f"arm {loaded.name!r} is another version ({loaded.digest}) than the one that was "
-                f"used ({specification.digest})"
+                f"used ({wanted.digest})"
             )
         return loaded
 
