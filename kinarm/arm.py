@@ -21,8 +21,6 @@ from kinarm.errors import ArmError, finite_array
 from kinarm.meshes import coal_shape, hulls_of_mesh
 from kinarm.urdf import Description, read_urdf
 
-DEFAULT_ARM = "paper"
-
 
 @dataclass(frozen=True, eq=False)
 class Arm:
@@ -71,7 +69,7 @@ class Arm:
         return type(self), tuple(getattr(self, item.name) for item in fields(self))
 
     @classmethod
-    def load(cls, arm: ArmSpecification | str | Path = DEFAULT_ARM, **changes: Any) -> "Arm":
+    def load(cls, arm: ArmSpecification | str | Path = "paper", **changes: Any) -> "Arm":
         """Load an arm by name, or any supported arm from a URDF or an arm file.
 
         Parameters

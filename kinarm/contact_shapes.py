@@ -29,9 +29,6 @@ from kinarm.scene import Scene
 BETWEEN_CAPSULES, WITH_BOX, WITH_HALFSPACE = range(3)
 """Kinds of pairs in `ContactShapes.pairs`."""
 
-EXACT = coal.Capsule | coal.Sphere
-"""Shapes that equal their capsule."""
-
 PLANE = 5
 """Entries of a separating plane (`kinarm.kernels.planes`)."""
 
@@ -157,7 +154,7 @@ class ContactShapes(NamedTuple):
         inner = map(inner_capsule, objects)
         capsules = [np.append(each.corners, each.rounding) for each in inner]
         capsules += [np.append(AXIS, 0.0 if each.exact else -np.inf) for each in surroundings]
-        exact = [isinstance(each.geometry, EXACT) for each in objects]
+        exact = [isinstance(each.geometry, coal.Capsule | coal.Sphere) for each in objects]
         exact += [each.exact for each in surroundings]
         return cls(
             capsules=np.array(capsules, dtype=np.float64).reshape(-1, 7),

@@ -5,10 +5,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from kinarm.bodies import RandomBodies
 from kinarm.contact_shapes import placed_row, unit_body
 from kinarm.errors import ProblemError, UnknownNameError
-from kinarm.kernels.compiling import Array
 from kinarm.scene import Scene
 
 IN_WORLD, ON_PATH, ON_BODY = range(3)
@@ -78,7 +76,7 @@ class SceneDraws(NamedTuple):
                 if below.shape != "box" or below.rotation[2, 2] != 1.0:
                     told = f"random bodies {each.name!r} stand on {each.near!r}"
                     raise ProblemError(f"{told}, which is no upright box")
-                half = np.array(below.size) / 2
+                half = np.array([*below.size[:2], 0.0]) / 2
             else:
                 raise UnknownNameError("obstacle", each.near, names[: len(scene.obstacles)])
             first = names.index(each.slots[0].name) if each.slots else 0
@@ -87,7 +85,7 @@ class SceneDraws(NamedTuple):
             sizes.append([(*unit.size, unit.rounding) for unit in units])
             corners = units[0].corners
             extents.append((corners.min(axis=0), corners.max(axis=0)))
-            places.append(_places(each, half))
+            places.append((-half, half) if each.lower is None else (each.lower, each.upper))
         return cls(
             entries=np.array(entries, dtype=np.int64).reshape(-1, 6),
             measures=np.array(
@@ -100,15 +98,3 @@ class SceneDraws(NamedTuple):
             placed=np.array([placed_row(body, unit_body(body)) for body in scene.bodies]),
             seed=scene.seed,
         )
-
-
-def _places(bodies: RandomBodies, half: Array) -> Array:
-    """Range of positions relative to what they are near, shape (2, 3) [m].
-
-    ``half`` is the half-size of the obstacle that they stand on, if any, shape (3,) [m].
-    """
-    if bodies.lower is not None:
-        return np.array([bodies.lower, bodies.upper], dtype=np.float64)
-    places = np.array([-half, half])
-    places[:, 2] = 0.0
-    return places

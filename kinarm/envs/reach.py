@@ -12,9 +12,6 @@ from kinarm.errors import InvalidInputError, finite_array
 from kinarm.problem import ProblemLike
 from kinarm.simulator import StepResult
 
-FIRST_ROW = np.zeros(1, dtype=np.int64)
-"""The row of a batch of one."""
-
 
 class ReachEnv(ArmEnvironment, gymnasium.Env[Any, Array]):
     """Reach a cube on a bench with a six-axis arm (paper, section 3).
@@ -107,7 +104,7 @@ class ReachEnv(ArmEnvironment, gymnasium.Env[Any, Array]):
         super().reset(seed=seed)
         if self._episodes is None or seed is not None:
             self._queues.seed(0, self.np_random)
-        episode = self._begin(FIRST_ROW, options)
+        episode = self._begin(np.arange(1), options)
         info = {"distance": episode.distance.item(), "configuration": self.configuration}
         return self._observation(episode), info
 
