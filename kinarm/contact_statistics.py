@@ -87,19 +87,19 @@ def contact_on_bare_ground(arm: Arm) -> ContactModel:
 
 
 def arm_warnings(contact: ContactModel) -> list[str]:
-    """What makes the description of an arm doubtful, a line each; nothing of shipped arms.
+    """What makes the description of an arm doubtful, a line each.
 
     These are missing collision shapes, pairs of bodies that are never tested,
-    since they touch at home, and joints faster than 30 rad/s. Takes an arm's
-    `contact_on_bare_ground`.
+    since they touch at home (of shipped arms, pairs with a held body), and
+    joints faster than 30 rad/s. Takes an arm's `contact_on_bare_ground`.
     """
     arm, lines = contact.arm, list[str]()
-    if arm.specification.source in arm_names():
-        return lines
+    held = {body.name for body in arm.held_bodies}
+    own = arm.specification.source not in arm_names()
     if not any(shape.parentJoint for shape in arm.geometry.geometryObjects):
         lines.append("no moving link has a collision shape: it touches nothing, ever")
-    left_out = contact.left_out.items()
-    resting = [" and ".join(pair) for pair, why in left_out if why == TOUCH_AT_HOME]
+    untested = (pair for pair, why in contact.left_out.items() if why == TOUCH_AT_HOME)
+    resting = [" and ".join(pair) for pair in untested if own or held & set(pair)]
     if resting:
         more = f", and {len(resting) - 3} more" if len(resting) > 3 else ""
         lines.append(

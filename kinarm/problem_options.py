@@ -110,7 +110,7 @@ class ProblemOptions(Checked):
 def say_choices(problems: Iterable[ReachProblem]) -> None:
     """Say on standard error what was chosen for problems' URDFs, and what is doubtful in them."""
     for specification in dict.fromkeys(problem.arm for problem in problems):
-        if specification.source not in arm_names():
+        if specification.source not in arm_names() or specification.held_bodies:
             from kinarm.arm import Arm
             from kinarm.contact_statistics import arm_warnings, contact_on_bare_ground
 

@@ -11,8 +11,9 @@ from kinarm import Arm, ReachProblem, Simulator, World
 from kinarm.arm_specification import AllowedContact, ArmSpecification
 from kinarm.bodies import SHAPES, HeldBody
 from kinarm.contact_pairs import TOUCH_AT_HOME
-from kinarm.contact_statistics import contact_on_bare_ground
+from kinarm.contact_statistics import arm_warnings, contact_on_bare_ground
 from kinarm.errors import KinarmError
+from kinarm.problem_options import say_choices
 from kinarm.recording import record_path
 from kinarm.viewer.visual_shapes import arm_parts
 
@@ -49,9 +50,15 @@ def test_what_the_file_allows_is_not_tested():
     assert ("forearm", "it") in pairs
 
 
-def test_what_touches_at_home_is_told():
-    contact = contact_on_bare_ground(holding(held(position=(0.0, 0.0, 0.0))))
+def test_what_touches_at_home_is_told(capsys):
+    arm = holding(held(position=(0.0, 0.0, 0.0)))
+    contact = contact_on_bare_ground(arm)
     assert contact.left_out["wrist", "it"] == TOUCH_AT_HOME
+    (line,) = arm_warnings(contact)
+    assert "since they touch at home: forearm and it, wrist and it;" in line
+    say_choices([ReachProblem.load("right").replace(arm=arm)])
+    assert capsys.readouterr().err == f"arm paper: {line}\n"
+    assert arm_warnings(contact_on_bare_ground(holding(held()))) == []
 
 
 @pytest.mark.parametrize("placed", [False, True])
