@@ -294,6 +294,8 @@ def read_meshes(table: Any, path: Path) -> None:
         if isinstance(entry, dict) and isinstance(entry.get("mesh"), str):
             from kinarm.meshes import mesh_vertices
 
+            if "vertices" in entry:
+                raise InvalidInputError(f"{path}: {name}[{number}] has both mesh and vertices")
             given = {key: entry.pop(key) for key in ("mesh", "scale", "hull") if key in entry}
             try:
                 file = absolute(path).parent / given.pop("mesh")

@@ -207,7 +207,7 @@ def mesh_vertices(
     """
     file, factors = Path(path), np.full(3, finite_array("scale", scale, ()))
     (shape,) = hulls_of_mesh(file, factors)
-    if not hull:
+    if hull is not True:
         solid = coal.MeshLoader(coal.BV_AABB).load(str(file), factors).computeVolume()
         excess = shape.computeVolume() / abs(solid) - 1 if solid else np.inf
         if excess > CONVEX:

@@ -197,7 +197,7 @@ class ReachVectorEnv(ArmEnvironment, VectorEnv[Any, Array, NDArray[Any]]):
     def _seeds(self, seed: int | Sequence[int | None] | None) -> list[int | None]:
         if seed is None:
             return [None] * self.num_envs
-        if isinstance(seed, int | np.integer):
+        if isinstance(seed, int | float | np.generic):
             return [whole_number("seed", seed, 0) + row for row in range(self.num_envs)]
         if len(seed) != self.num_envs:
             raise InvalidInputError(f"seed must hold {self.num_envs} numbers, got {len(seed)}")

@@ -103,15 +103,23 @@ class TestScenes:
         np.testing.assert_allclose(np.sort(found.vertices, 0), np.sort(CORNERS * 0.2, 0), atol=1e-9)
         assert found.position == box.position
 
-    def test_meshes_that_are_not_convex_are_refused(self, tmp_path):
+    @pytest.mark.parametrize(
+        ("more", "message"),
+        [
+            ("", "obstacles.0.: mesh 'bent.stl' is not convex"),
+            ('hull = "no"', "obstacles.0.: mesh 'bent.stl' is not convex"),
+            ("vertices = [[0, 0, 0]]", "obstacles.0. has both mesh and vertices"),
+        ],
+    )
+    def test_meshes_that_are_not_convex_or_given_twice_are_refused(self, tmp_path, more, message):
         bent = CORNERS.copy()
         bent[CUBE_CORNERS.sum(axis=1) == 3] = -0.2
         write_stl(tmp_path / "bent.stl", bent)
         (tmp_path / "scene.toml").write_text(
-            '[[obstacles]]\nname = "it"\nmesh = "bent.stl"\n'
+            f'[[obstacles]]\nname = "it"\nmesh = "bent.stl"\n{more}\n'
             "[[goal_regions]]\nname = 'g'\nlower = [0.3, 0.3, 0.3]\nupper = [0.4, 0.4, 0.3]\n"
         )
-        with pytest.raises(KinarmError, match=r"obstacles\[0\]: mesh 'bent.stl' is not convex"):
+        with pytest.raises(KinarmError, match=message):
             find_scene(tmp_path / "scene.toml")
 
     @pytest.mark.parametrize("shape", SHAPES)

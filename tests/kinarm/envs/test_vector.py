@@ -251,7 +251,7 @@ class TestOptions:
         np.testing.assert_array_equal(observations, untouched.step(actions)[0])
 
 
-@pytest.mark.parametrize("seed", [[1, 2], [], -1, [-1] * NUMBER])
+@pytest.mark.parametrize("seed", [[1, 2], [], -1, [-1] * NUMBER, 3.0])
 def test_bad_seeds_are_refused(seed):
     with pytest.raises(InvalidInputError, match="seed"):
         native("SameStep").reset(seed=seed)
