@@ -109,10 +109,10 @@ class Arm:
             allowed_contacts=wanted.allowed_contacts or (),
             chain=chain,
         )
-        if wanted.digest not in (None, loaded.digest):
+        if specification.digest not in (None, loaded.digest):
             raise ArmError(
                 f"arm {loaded.name!r} is another version ({loaded.digest}) than the one that was "
-                f"used ({wanted.digest})"
+                f"used ({specification.digest})"
             )
         return loaded
 

@@ -182,4 +182,6 @@ class ArmFile(Checked):
         file = from_plain(cls, entries, str(path))
         if file.arm.source.endswith(".toml"):
             raise ArmError(f"{path}: 'arm.source' must be a URDF or a known arm, no arm file")
+        if file.arm.digest is not None:
+            raise ArmError(f"{path}: 'arm.digest' is for problem files, which say of which arm")
         return replace(file, arm=file.arm.resolved(path.parent))

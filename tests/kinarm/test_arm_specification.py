@@ -33,15 +33,6 @@ def test_pinned_digest_has_to_hold(shipped_arms):
         Arm.load("paper_flange", digest=digest)
 
 
-def test_digest_of_an_arm_file_has_to_hold(tmp_path, shipped_arms):
-    path, digest = tmp_path / "mine.toml", shipped_arms["paper"].digest
-    path.write_text(f'[arm]\nsource = "paper"\ndigest = "{digest}"')
-    assert Arm.load(path).digest == digest
-    path.write_text(f'[arm]\nsource = "paper_flange"\ndigest = "{digest}"')
-    with pytest.raises(ArmError, match=f"'mine' is another version .*{digest}"):
-        Arm.load(path)
-
-
 class TestArmFiles:
     """Files that say of an arm what its URDF does not."""
 
@@ -101,6 +92,7 @@ class TestArmFiles:
             ("title = 3", "title|arm"),
             ("[arm]\nsource = 'other.toml'", "'arm.source' must be a URDF or a known arm"),
             ("[arm]\nsources = 'paper'", "unknown key 'arm.sources'"),
+            ("[arm]\nsource = 'paper'\ndigest = '12'", "'arm.digest' is for problem files"),
         ],
     )
     def test_unusable_files_are_refused(self, tmp_path, text, message):
