@@ -9,7 +9,6 @@ from numpy.typing import ArrayLike
 from kinarm.episodes import COLLISION, RUNNING, SUCCESS, Episodes, Outcome
 from kinarm.errors import InvalidInputError, ProblemError, RunStoppedError
 from kinarm.kernels.compiling import Array
-from kinarm.observation_layout import WITH_MEMORY
 from kinarm.policies.policy import Policy
 from kinarm.policies.running.backend import WiredArm
 from kinarm.policies.running.watchdog import SafeLimits, Watchdog
@@ -21,6 +20,9 @@ REST, SETTLED, LONGEST_REST = 1e-3, 0.1, 2.0
 
 REHEARSED = 30
 """Steps that are timed before the arm moves."""
+
+OF_COMMANDS = ("commanded", "last_action", "resolved_rate", "time_left")
+"""Parts of the observation that tell of commands, whatever is measured."""
 
 
 class Run:
@@ -82,10 +84,11 @@ class Run:
             raise ProblemError("a run does not know where bodies are that are random or move")
         if not 0.0 < speed <= 1.0:
             raise InvalidInputError(f"speed must lie in (0, 1], got {speed:g}")
-        held = {"commanded", *WITH_MEMORY}.intersection(world.layout.places) - {"time_left"}
-        if measured and (held or world.layout.history > 1):
-            seen = ", ".join(sorted(held)) or "a history"
+        layout = world.layout
+        if measured and (layout.history > 1 or "joint_velocities" in layout.places):
+            seen = "a history" if layout.history > 1 else "joint_velocities"
             raise InvalidInputError(f"a policy that sees {seen} takes commanded feedback in a run")
+        self._told_of = [layout.places[name] for name in OF_COMMANDS if name in layout.places]
         self.arm, self.policy, self.measured, self.name = arm, policy, measured, name
         self.simulator, self.speed = simulator.with_plant("ideal"), speed
         self.rate = rate or arm.backend.rate or 1.0 / time_step
@@ -152,8 +155,9 @@ class Run:
         """Let the policy act; where the step leads, shape (n_joints,) [rad or m]."""
         seen = episodes.observation
         if self.measured:
-            step = int(episodes.steps[0])
-            seen = self.simulator.world.observe(reading[None], episodes.goal, step)
+            seen = self.simulator.world.observe(reading[None], episodes.goal)
+            for place in self._told_of:
+                seen[:, place] = episodes.observation[:, place]
         self.simulator.step(episodes, self.policy(seen))
         return np.array(episodes.q[0])
 

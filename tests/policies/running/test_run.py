@@ -4,9 +4,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from random_policies import policy_for
 
 from docs.measurements.injections import FaultyArm
-from kinarm import Plant, Simulator
+from kinarm import Plant, ReachProblem, Simulator
 from kinarm.errors import (
     InvalidInputError,
     PolicyFileError,
@@ -15,6 +16,7 @@ from kinarm.errors import (
     StartInContactError,
 )
 from kinarm.policies import export_policy, load_policy
+from kinarm.policies.arm_policy import ArmPolicy
 from kinarm.policies.export import load_wiring
 from kinarm.policies.running.backend import WiredArm
 from kinarm.policies.running.fake import FakeArm
@@ -116,6 +118,26 @@ class TestMotion:
         settings = {"measured": measured, "speed": 0.5}
         made = make(plant=Plant(**LAG, noise=1e-4), settings=settings).to_goals(trial[1])
         assert [each.outcome for each in made] == ["success"] * 3
+
+    @pytest.mark.parametrize("memory", [False, True])
+    def test_measured_joints_are_seen_as_by_the_exported_runtime(
+        self, make, policy, simulator, trial, tmp_path, memory
+    ):
+        """Rates, commands and actions are those of the command."""
+        if memory:
+            shown = ["goal", "joint_positions", "commanded", "last_action", "time_left"]
+            policy = policy_for(ReachProblem.load("both").replace(observation=shown))
+        export_policy(policy, tmp_path / "out", onnx=False)
+        settings, readings, told = {"speed": 1.0, "measured": True}, [], Told()
+        settings["limits"] = SafeLimits(distance=10.0, overspeed=10.0)
+        lagging = make(settings=settings, takes=told, plant=Plant(**LAG))
+        run = Run(lagging.arm, policy, simulator.shielded(False), **settings)
+        run.arm.backend.reads = lambda q: readings.append(q) or q
+        run.to_goals(trial[1][:1])
+        runtime = ArmPolicy(tmp_path / "out", feedback="measured")
+        for reading, command in zip(readings[1:12], told.positions[:11], strict=True):
+            expected = runtime.command(reading, trial[1][0])
+            np.testing.assert_allclose(command, expected, rtol=0, atol=1e-9)
 
     def test_recordings(self, make, trial, tmp_path):
         made = make().to_goals(trial[1])
