@@ -2,7 +2,7 @@
 
 from copy import copy
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -160,9 +160,13 @@ class Simulator(EpisodeRunner):
         other.world = world
         return other
 
+    def changed(self, **changes: Any) -> "Simulator":
+        """Another simulator of the same world with other settings; see `kinarm.World.changed`."""
+        return self._in(self.world.changed(**changes))
+
     def with_tolerance(self, tolerance: float) -> "Simulator":
         """Another simulator of the same world with another tolerance [m]."""
-        return self._in(self.world.changed(tolerance=tolerance))
+        return self.changed(tolerance=tolerance)
 
     def in_scene(self, start: ArrayLike, goal: ArrayLike) -> "Simulator":
         """The simulator of one episode; see `kinarm.World.in_scene`."""
@@ -170,15 +174,15 @@ class Simulator(EpisodeRunner):
 
     def with_plant(self, plant: Plant | str | Path) -> "Simulator":
         """Another simulator of the same world with another plant, itself, its name or file."""
-        return self._in(self.world.changed(plant=plant))
+        return self.changed(plant=plant)
 
     def shielded(self, shield: bool = True) -> "Simulator":
         """The same simulator with or without a shield."""
-        return self._in(self.world.changed(shield=shield))
+        return self.changed(shield=shield)
 
     def seen_as(self, observation: Observation) -> "Simulator":
         """The same simulator with another observation; ProblemError if it cannot have it."""
-        return self._in(self.world.changed(observation=observation))
+        return self.changed(observation=observation)
 
     def without_moving_bodies(self) -> "Simulator":
         """The same simulator without the bodies that move."""

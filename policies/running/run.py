@@ -26,10 +26,10 @@ OF_COMMANDS = ("commanded", "last_action", "resolved_rate", "time_left")
 
 
 class Run:
-    """A policy on an arm: commands are the motion of an episode whose joints obey at once.
+    """A policy on an arm: commands are the motion of episodes whose joints obey at once.
 
     Each step of the policy is commanded as a straight motion of whole cycles, so that it is the one
-    which the shield has proven free.
+    which the shield has proven free. An episode has one goal, also where the task has a sequence.
 
     Parameters
     ----------
@@ -78,7 +78,8 @@ class Run:
         name: str = "policy",
     ) -> None:
         policy.check_arm(simulator.arm)
-        simulator = simulator.seen_as(policy.observation)
+        seen, alone = policy.observation, {"sequence": 1}
+        simulator = simulator.changed(observation=seen, plant="ideal", goal=alone)
         world, time_step = simulator.world, simulator.problem.stepping.time_step
         if world.has_random_bodies or len(world.contact_model.shapes.moving):
             raise ProblemError("a run does not know where bodies are that are random or move")
@@ -90,7 +91,7 @@ class Run:
             raise InvalidInputError(f"a policy that sees {seen} takes commanded feedback in a run")
         self._told_of = [layout.places[name] for name in OF_COMMANDS if name in layout.places]
         self.arm, self.policy, self.measured, self.name = arm, policy, measured, name
-        self.simulator, self.speed = simulator.with_plant("ideal"), speed
+        self.simulator, self.speed = simulator, speed
         self.rate = rate or arm.backend.rate or 1.0 / time_step
         self.parts = max(1, math.ceil(self.rate * time_step / speed - 1e-9))
         self.recordings, self.latencies = list[Recording](), list[float]()

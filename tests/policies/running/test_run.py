@@ -139,6 +139,13 @@ class TestMotion:
             expected = runtime.command(reading, trial[1][0])
             np.testing.assert_allclose(command, expected, rtol=0, atol=1e-9)
 
+    def test_a_goal_is_the_last_of_its_episode(self, make, policy, simulator, trial):
+        """A task's sequence does not go on to goals that nobody named."""
+        follow = simulator.changed(goal={"sequence": 3})
+        (made,) = Run(make().arm, policy, follow).to_goals(trial[1][:1])
+        assert made.outcome == "success"
+        np.testing.assert_array_equal(made.states, make().to_goals(trial[1][:1])[0].states)
+
     def test_recordings(self, make, trial, tmp_path):
         made = make().to_goals(trial[1])
         save_recordings(tmp_path / "run.npz", made)
