@@ -103,14 +103,13 @@ class Run:
         Raises
         ------
         InvalidInputError
-            If a goal is out of reach, or cycles take too long here.
+            If a goal is none, or out of reach, or cycles take too long here.
         StartInContactError
             If the arm touches something.
         RunStoppedError
             If the watchdog stops it, or the arm does not answer.
         """
-        aims = np.array(goals, dtype=float)
-        self._check_goals(aims)
+        aims = self._checked(goals)
         with self.arm.connected(self.rate) as arm:
             self._told = self._start(arm.read())
             self._rehearse(aims[0])
@@ -118,13 +117,17 @@ class Run:
                 self._reach(goal)
         return self.recordings
 
-    def _check_goals(self, goals: Array) -> None:
+    def _checked(self, goals: ArrayLike) -> Array:
+        """Goals, each of which the arm reaches somehow without contact."""
         world = self.simulator.world
+        starts = np.tile(world.arm.home, (len(np.atleast_1d(goals)), 1))
+        aims = world.check_scenarios(starts, goals)[1]
         nothing = np.zeros((0, *world.contact_model.shapes.placed.shape))
-        found, _ = world.solved_goals(goals, np.zeros(len(goals)), nothing)
+        found, _ = world.solved_goals(aims, np.zeros(len(aims)), nothing)
         if not found.all():
-            goal = goals[int(found.argmin())].tolist()
+            goal = aims[int(found.argmin())].tolist()
             raise InvalidInputError(f"the goal {goal} is out of reach, or all around it touches")
+        return aims
 
     def _start(self, reading: Array) -> Array:
         """A reading within the limits, which it may miss by a step."""

@@ -254,6 +254,16 @@ class TestRefusals:
     def test_goal_out_of_reach(self, make):
         self.check(make(), np.array([[2.0, 0, 0.5]]), InvalidInputError, "out of reach")
 
+    @pytest.mark.parametrize("goal", [[0.4, -0.5, 0.3], [], [[0.4, -0.5]], [[0.4, np.nan, 0.3]]])
+    def test_what_is_no_goal(self, make, goal):
+        self.check(make(), goal, InvalidInputError, "goals must")
+
+    def test_goal_without_a_direction(self, make, policy, simulator):
+        upright = simulator.changed(goal={"kind": "direction"})
+        other = policy_for(upright.problem)
+        goal = [[0.4, -0.5, 0.3, 0.0, 0.0, 0.0]]
+        self.check(Run(make().arm, other, upright), goal, InvalidInputError, "must have length 1")
+
     def test_start_in_contact(self, make, simulator, trial):
         rng, arm = np.random.default_rng(0), simulator.arm
         q = rng.uniform(arm.lower, arm.upper, (200, 6))
