@@ -1,5 +1,6 @@
 """``kinarm-run``: drive an arm by a policy, and check an arm against its contract."""
 
+import sys
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import partial
@@ -177,7 +178,7 @@ def _drive(request: RunRequest, _: str) -> None:
         name=Path(request.policy).stem,
     )
     try:
-        with telling(lambda: "interrupted; the arm rests"):
+        with telling(lambda: f"interrupted; {str(sys.exc_info()[1]) or 'the arm rests'}"):
             run.to_goals(goals)
     finally:
         _report(request.record, run)

@@ -58,13 +58,12 @@ def test_check_finds_an_error(run, folder, monkeypatch):
 
 
 class TestStops:
-    def stop(self, monkeypatch, error, after=30):
-        command, calls = FakeArm.command, []
+    def stop(self, monkeypatch, error, *errors, after=30):
+        command, ahead = FakeArm.command, [*[None] * (after - 1), error, *errors]
 
         def fail(arm, positions):
-            calls.append(positions)
-            if len(calls) == after:
-                raise error
+            if ahead and (raised := ahead.pop(0)):
+                raise raised
             command(arm, positions)
 
         monkeypatch.setattr(FakeArm, "command", fail)
@@ -83,6 +82,13 @@ class TestStops:
         answer = run("kinarm-run", POLICY, "--backend", "fake", "--record", made)
         assert (answer.status, answer.err) == (130, "kinarm-run: interrupted; the arm rests\n")
         assert load_recordings(made)[0].steps > 4
+
+    def test_connection_that_is_lost_after_ctrl_c(self, run, monkeypatch):
+        """Nobody knows whether the arm rests."""
+        self.stop(monkeypatch, KeyboardInterrupt(), ConnectionError("cable"))
+        answer = run("kinarm-run", POLICY, "--backend", "fake")
+        said = "kinarm-run: interrupted; lost the arm: cable\n"
+        assert (answer.status, answer.err) == (130, said)
 
 
 @pytest.mark.parametrize(
