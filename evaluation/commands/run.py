@@ -161,6 +161,7 @@ def _drive(request: RunRequest, _: str) -> None:
     if request.record is not None:
         check_output(request.record, overwrite=request.overwrite, suffix=".npz")
     policy, simulator, wiring = request.faced()
+    simulator = simulator.shielded(request.shield)
     starts, goals = simulator.sample(np.random.default_rng(request.seed), request.trials)
     if request.goal:
         width = simulator.world.goal_width

@@ -1,9 +1,12 @@
 """``kinarm-run``: runs and checks, and one line that says why not."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from refusals import check_refused
 
+from kinarm.policies import export_policy, load_policy
 from kinarm.policies.running.fake import FakeArm
 from kinarm.recording import load_recordings
 
@@ -14,8 +17,6 @@ POSE = ("0.5", "0.9", "1.3", "-0.6", "-1.1", "0")
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
-    from kinarm.policies import export_policy, load_policy
-
     out = tmp_path_factory.mktemp("exported") / "best"
     wiring = {"sign": [1, -1, 1, 1, 1, 1], "offset": [0, 0.3, 0, 0, 0, 0]}
     export_policy(load_policy(POLICY), out, onnx=False, **wiring)
@@ -36,6 +37,19 @@ def test_fake_arm_and_recording(run, folder, tmp_path):
     check_refused(again, "exists")
     page = tmp_path / "page.html"
     assert run("kinarm-replay", made, "--out", page).status == 0
+
+
+@pytest.mark.parametrize("shield", [True, False])
+def test_shield_of_a_policy_that_learnt_behind_one(run, tmp_path, shield):
+    """The option decides."""
+    policy = load_policy(POLICY)
+    made = replace(policy.provenance, problem=policy.problem.replace(shield=True))
+    replace(policy, provenance=made).save(tmp_path / "mine.npz")
+    words = ("--backend", "fake", "--trials", 1, "--record", tmp_path / "run.npz")
+    words += () if shield else ("--no-shield",)
+    assert run("kinarm-run", tmp_path / "mine.npz", *words).status == 0
+    (kept,) = load_recordings(tmp_path / "run.npz")
+    assert kept.problem.stepping.shield == shield
 
 
 def test_check(run, folder):
