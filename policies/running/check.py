@@ -112,7 +112,7 @@ class ContractCheck:
 
     def _moved_wrongly(self) -> list[str]:
         """The first joint that answers otherwise than it is told, if any."""
-        rest = round(REST * self.rate)
+        rest = max(READINGS, round(REST * self.rate))
         for joint, way in enumerate(self._moves):
             home = self.arm.followed(np.tile(self._held, (READINGS, 1))).mean(axis=0)
             step = way * (np.arange(len(home)) == joint)

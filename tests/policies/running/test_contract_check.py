@@ -5,8 +5,10 @@ import warnings
 
 import numpy as np
 import pytest
+from random_policies import sliding
 
 from docs.measurements.injections import KINDS, FaultyArm, measure
+from kinarm import ReachProblem, Scene
 from kinarm.errors import InvalidInputError
 from kinarm.policies.running.backend import WiredArm
 from kinarm.policies.running.check import ContractCheck
@@ -68,6 +70,15 @@ def test_what_does_not_show_at_a_pose_is_said(world):
     assert lines == ["sign or scale, if wrong both ways, of axis_1"]
     pose = POSE * [0, 1, 1, 1, 1, 1]
     assert said(world, changed(0, -1.0), changed(0, -1.0), pose) == []
+
+
+@pytest.mark.parametrize("rate", [2.0, 5.0, 10.0])
+def test_slow_cycles(rate, make_joint, write_robot):
+    """Readings on the way to where a joint is told to be do not count."""
+    scene, pose = Scene(obstacles=(), ground=False), np.array([0.5, 0.9, 1.3])
+    arm = sliding(make_joint, write_robot)
+    world = World(ReachProblem.load("both").replace(arm=arm, scene=scene))
+    assert ContractCheck(WiredArm(FakeArm(world, pose), world), world, pose, rate).run() == []
 
 
 def test_injections():
