@@ -198,7 +198,7 @@ class Policy:
         Parameters
         ----------
         model : BaseAlgorithm, str or Path
-            PPO, A2C, SAC, TD3, DDPG or TQC with ``MlpPolicy`` or
+            PPO, A2C, SAC, TD3, DDPG, TQC or TRPO with ``MlpPolicy`` or
             ``MultiInputPolicy``, or its file. Loading runs code in the file:
             open only files that you trust.
         problem : ReachProblem, str or Path, optional

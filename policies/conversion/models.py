@@ -94,14 +94,14 @@ def _family(kind: type) -> str:
             return family
     raise InvalidInputError(
         f"cannot convert the policy {kind.__name__}; what can be converted: models of TQC, SAC, "
-        "DDPG, TD3, PPO, A2C"
+        "DDPG, TD3, PPO, A2C, TRPO"
     )
 
 
 def _algorithm_of(family: str, data: Mapping[str, Any]) -> str:
     """Which algorithm a file is of, judged by its settings."""
     if family == "ActorCriticPolicy":
-        return "ppo" if "clip_range" in data else "a2c"
+        return "ppo" if "clip_range" in data else "trpo" if "cg_max_steps" in data else "a2c"
     if family == "TD3Policy":
         return "ddpg" if data["policy_delay"] == 1 and not data["target_noise_clip"] else "td3"
     return "tqc" if family == "TQCPolicy" else "sac"

@@ -24,14 +24,13 @@ MAKE = {"MlpPolicy": partial(ReachEnv, "right"), "MultiInputPolicy": partial(Rea
 
 
 def algorithm(name):
-    if name == "TQC":
-        return pytest.importorskip("sb3_contrib").TQC
-    return getattr(sb3, name)
+    library = pytest.importorskip("sb3_contrib") if name in ("TQC", "TRPO") else sb3
+    return getattr(library, name)
 
 
 def make_model(name, policy="MlpPolicy", env=None, **settings):
     """A model whose parameters are random, as after a long training."""
-    if name not in ("PPO", "A2C"):
+    if name not in ("PPO", "A2C", "TRPO"):
         settings["buffer_size"] = 10
     env = vec_env.DummyVecEnv([MAKE[policy]]) if env is None else env
     model = algorithm(name)(policy, env, seed=5, device="cpu", **settings)
@@ -79,7 +78,7 @@ def check_same(model, policy, observations):
 @pytest.mark.parametrize(
     ("policy", "normalize"), [("MlpPolicy", True), ("MultiInputPolicy", False)]
 )
-@pytest.mark.parametrize("name", ["PPO", "A2C", "SAC", "TD3", "DDPG", "TQC"])
+@pytest.mark.parametrize("name", ["PPO", "A2C", "SAC", "TD3", "DDPG", "TQC", "TRPO"])
 def test_acts_as_the_model(name, policy, normalize, observations, tmp_path):
     env = normalized(policy) if normalize else None
     model = make_model(name, policy, env)
