@@ -21,9 +21,6 @@ from kinarm.policies.conversion.to_torch import command_module, onnx_model
 from kinarm.policies.policy import Policy
 from kinarm.world import World
 
-REACHED = ("rotation_tolerance", "hold", "speed")
-"""When a goal counts as reached, beside the tolerance of its position."""
-
 WIRING = ("sign", "offset")
 """Of a joint in a contract: what the arm reads is sign * position + offset."""
 
@@ -37,7 +34,7 @@ GOALS = {
     "position": "position x, y, z [m]",
     "direction": "position x, y, z [m], and unit direction x, y, z of the tool's axis",
     "pose": "position x, y, z [m], and orientation of the tool frame, quaternion w, x, y, z",
-    "configuration": "tool position x, y, z [m], and the joint positions there [rad or m]",
+    "configuration": "tool position x, y, z [m], and the model's joint positions there [rad or m]",
 }
 """What a row of a goal is, by its kind."""
 
@@ -100,6 +97,8 @@ def export_policy(
         "contract.json": (json.dumps(contract, indent=1) + "\n").encode(),
     }
     check_folder(where)
+    for name in {"network.onnx", "policy.onnx"} - files.keys():  # of an earlier policy
+        (where / name).unlink(missing_ok=True)
     for name, held in files.items():
         write_atomically(where / name, methodcaller("write", held))
     return contract
@@ -156,7 +155,7 @@ def contract_of(
     memory = layout.remembers
     kind, side = task.goal.kind, None if policy.mirror is None else policy.mirror.side
     meant = {"kind": kind, "is": GOALS[kind], "length": world.goal_width}
-    meant["tolerance"] = task.tolerance
+    meant |= {"tolerance": task.tolerance, "rotation_tolerance": task.goal.rotation_tolerance}
     contract = {
         "made_by": f"kinarm {kinarm.__version__}",
         "policy": {
@@ -172,7 +171,7 @@ def contract_of(
         "tool": {name: array.tolist() for name, array in tool.items()},
         "time_step": dt,
         "rate": 1.0 / dt,
-        "goal": meant | {name: getattr(task.goal, name) for name in REACHED},
+        "goal": {**meant, "hold": task.goal.hold, "speed": task.goal.speed},
         "observation": {
             "parts": parts,
             "history": layout.history,

@@ -138,9 +138,13 @@ class Policy:
         given = np.asarray(observations, dtype=float)
         shape = (self.n_observations,) if given.ndim == 1 else (None, self.n_observations)
         x = finite_array("observations, as policy.observation has them,", given, shape)
-        side = None if self.mirror is None else self.mirror.side
-        actions: NDArray[np.float64] = choose_action(np, self.arrays, [*self.activations], side, x)
+        actions: NDArray[np.float64] = self._act(np, self.arrays, x)
         return actions
+
+    def _act(self, xp: Any, arrays: Any, observations: Any) -> Any:
+        """Actions by the arrays of a library; see `kinarm.policies.arm_policy.choose_action`."""
+        side = None if self.mirror is None else self.mirror.side
+        return choose_action(xp, arrays, [*self.activations], side, observations)
 
     def predict(
         self,
@@ -255,9 +259,9 @@ class Policy:
 
     def to_torch(self) -> Any:
         """Make a module of PyTorch that maps observations to actions, in double precision."""
-        from kinarm.policies.conversion.to_torch import network_module
+        from kinarm.policies.conversion.to_torch import module_of
 
-        return network_module(self.arrays, self.activations, self.mirror)
+        return module_of(self.arrays, self._act)
 
     def to_onnx(self, path: str | Path) -> None:
         """Write the network in ONNX, from ``observation`` to ``action`` (extra ``export``).

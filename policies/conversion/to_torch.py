@@ -2,11 +2,10 @@
 
 import io
 import warnings
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from typing import Any
 
 from kinarm.errors import needed
-from kinarm.networks import Mirror
 from kinarm.policies.arm_policy import (
     arm_arrays,
     choose_action,
@@ -43,18 +42,6 @@ def module_of(arrays: Mapping[str, Any], function: Callable[..., Any]) -> Any:
             return function(torch, held, *inputs)
 
     return FunctionModule()
-
-
-def network_module(
-    arrays: Mapping[str, Any], activations: Sequence[str], mirror: Mirror | None
-) -> Any:
-    """A policy, by the arrays of its file: observations to actions."""
-    side = None if mirror is None else mirror.side
-
-    def act(xp: Any, held: Any, observations: Any) -> Any:
-        return choose_action(xp, held, list(activations), side, observations)
-
-    return module_of(arrays, act)
 
 
 def command_module(arrays: Mapping[str, Any], contract: Mapping[str, Any]) -> Any:

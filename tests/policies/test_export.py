@@ -304,6 +304,17 @@ class TestRefusals:
             export_policy(policy, tmp_path / "file", onnx=False, overwrite=True)
 
 
+def test_nothing_is_left_of_an_earlier_policy(tmp_path):
+    """Its network would stand beside the runtime of another one."""
+    out, policy = tmp_path / "out", load_policy("ars-linear-both")
+    out.mkdir()
+    for name in ("policy.onnx", "network.onnx", "notes.txt"):
+        (out / name).touch()
+    export_policy(policy, out, onnx=False, overwrite=True)
+    assert (out / "notes.txt").exists()
+    assert not [*out.glob("*.onnx")]
+
+
 class TestTorch:
     @pytest.mark.parametrize("name", ["ars-linear-both", "ppo-best-both"])
     def test_module(self, name):
