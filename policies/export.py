@@ -152,7 +152,6 @@ def contract_of(
         {"name": part.name, "length": layout.length(part), "unit": part.unit, "is": part.meaning}
         for part in layout.parts
     ]
-    memory = layout.remembers
     kind, side = task.goal.kind, None if policy.mirror is None else policy.mirror.side
     meant = {"kind": kind, "is": GOALS[kind], "length": world.goal_width}
     meant |= {"tolerance": task.tolerance, "rotation_tolerance": task.goal.rotation_tolerance}
@@ -176,7 +175,7 @@ def contract_of(
             "parts": parts,
             "history": layout.history,
             "horizon": task.horizon,
-            "memory": memory,
+            "memory": layout.remembers,
         },
         "plant": {"feedback": plant.feedback, **to_plain(plant)},
         "shield": problem.stepping.shield,

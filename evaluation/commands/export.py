@@ -18,6 +18,10 @@ class ExportRequest(Checked):
         The policy: its name, a file, or a model of Stable-Baselines3 (.zip).
     out : Path
         The folder to write.
+    problem : str
+        The problem of a model of Stable-Baselines3, whose file does not say it.
+    vec_normalize : Path
+        Statistics of VecNormalize for such a model (runs code), or none.
     onnx : bool
         Write it in ONNX as well, which needs the extra export.
     overwrite : bool
@@ -30,6 +34,8 @@ class ExportRequest(Checked):
 
     policy: str = field(metadata={"flag": "policy", "metavar": "POLICY"})
     out: Path = field(metadata={"metavar": "DIR"})
+    problem: str | None = None
+    vec_normalize: Path | None = field(default=None, metadata={"metavar": "FILE|none"})
     onnx: bool = True
     overwrite: bool = False
     sign: tuple[float, ...] = ()
@@ -37,11 +43,18 @@ class ExportRequest(Checked):
 
 
 def _export(request: ExportRequest, _: str) -> None:
+    from kinarm.errors import InvalidInputError
     from kinarm.policies import Policy, export_policy, load_policy
 
-    load = Policy.from_sb3 if request.policy.endswith(".zip") else load_policy
+    of_model = request.problem, request.vec_normalize
+    if request.policy.endswith(".zip"):
+        policy = Policy.from_sb3(request.policy, *of_model)
+    elif of_model != (None, None):
+        raise InvalidInputError("--problem and --vec-normalize are for a model (.zip)")
+    else:
+        policy = load_policy(request.policy)
     export_policy(
-        load(request.policy),
+        policy,
         request.out,
         overwrite=request.overwrite,
         onnx=request.onnx,

@@ -13,9 +13,6 @@ from kinarm.simulator import Simulator
 from kinarm.task import LONGEST_HORIZON, NEVER, RewardWeights
 from kinarm.world import World
 
-FAR = 1e3
-"""Distance of what is no goal [m]."""
-
 
 class FakeArm(SimulatedArm):
     """An arm that lags as a plant does, and stops before it touches something.
@@ -52,7 +49,7 @@ class FakeArm(SimulatedArm):
             )
             self._simulators[period] = Simulator(problem, threads=1)
         self._simulator, self.period = self._simulators[period], period
-        goal = self._simulator.world.reached(self.start[None]) + FAR
+        goal = self._simulator.world.reached(self.start[None]) + 1e3  # no goal: far away
         self._episodes = self._simulator.reset(self.start[None], goal)
         self._told = self.start
 

@@ -87,8 +87,7 @@ class Run:
             raise InvalidInputError(f"speed must lie in (0, 1], got {speed:g}")
         layout = world.layout
         if measured and (layout.history > 1 or "joint_velocities" in layout.places):
-            seen = "a history" if layout.history > 1 else "joint_velocities"
-            raise InvalidInputError(f"a policy that sees {seen} takes commanded feedback in a run")
+            raise InvalidInputError("joint_velocities and histories need commanded feedback")
         self._told_of = [layout.places[name] for name in OF_COMMANDS if name in layout.places]
         self.arm, self.policy, self.measured, self.name = arm, policy, measured, name
         self.simulator, self.speed = simulator, speed

@@ -6,8 +6,10 @@ import sys
 import pytest
 from refusals import check_refused
 
-from kinarm import ReachProblem
+from kinarm import ReachEnv, ReachProblem
 from kinarm.policies import Policy, load_policy
+from kinarm.policies.arm_policy import ArmPolicy
+from kinarm.policies.self_test import self_test
 
 
 def test_folder(run, tmp_path):
@@ -42,6 +44,39 @@ def test_without_the_extra(run, tmp_path, monkeypatch, missing):
     answer = run("kinarm-export", "ars-linear-both", "--out", out)
     check_refused(answer, missing, "pip install 'kinarm[export]'")
     assert not out.exists()
+
+
+@pytest.fixture(scope="module")
+def model(tmp_path_factory):
+    sb3 = pytest.importorskip("stable_baselines3")
+    folder = tmp_path_factory.mktemp("model")
+    env = sb3.common.vec_env.DummyVecEnv([lambda: ReachEnv("right")])
+    env = sb3.common.vec_env.VecNormalize(env)
+    made = sb3.PPO("MlpPolicy", env, n_steps=64, device="cpu").learn(64)
+    made.save(folder / "model.zip")
+    env.save(folder / "statistics.pkl")
+    return folder / "model.zip"
+
+
+class TestModels:
+    """Of Stable-Baselines3, whose files say neither their problem nor their statistics."""
+
+    def test_with_its_problem_and_statistics(self, run, model, tmp_path):
+        out = tmp_path / "out"
+        words = ("--problem", "right", "--vec-normalize", model.parent / "statistics.pkl")
+        answer = run("kinarm-export", model, *words, "--out", out, "--no-onnx")
+        assert (answer.status, answer.err) == (0, "")
+        assert self_test(ArmPolicy(out)) == []
+
+    def test_without(self, run, model, tmp_path):
+        words = ("--out", tmp_path / "out", "--no-onnx")
+        check_refused(run("kinarm-export", model, *words), "--problem")
+        check_refused(run("kinarm-export", model, "--problem", "right", *words), "--vec-normalize")
+
+    def test_of_what_is_no_model(self, run, tmp_path):
+        words = ("--out", tmp_path / "out", "--no-onnx", "--problem", "right")
+        answer = run("kinarm-export", "ars-linear-both", *words)
+        check_refused(answer, "--problem and --vec-normalize are for a model")
 
 
 class TestRefusals:

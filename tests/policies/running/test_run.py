@@ -312,7 +312,7 @@ class TestRefusals:
         layers = (wide, *policy.layers[1:])
         made = {"provenance": seen, "layers": layers, "mean": twice[0], "std": twice[1]}
         other = replace(policy, mirror=None, residual=False, **made)
-        with pytest.raises(InvalidInputError, match="sees a history takes commanded"):
+        with pytest.raises(InvalidInputError, match="histories need commanded feedback"):
             Run(make().arm, other, simulator, measured=True)
 
     def test_changed_folder(self, policy, tmp_path):
