@@ -211,7 +211,7 @@ class Policy:
         vec_normalize : VecNormalize, str or Path, optional
             The statistics that normalise its observations, their file, which
             runs code, or ``"none"``. By default those of the model's
-            environment; a file whose model was trained with some is refused.
+            environment; a model without one that was trained with some is refused.
 
         Raises
         ------

@@ -130,7 +130,7 @@ def load_vec_normalize(given: Any) -> Any:
     return given
 
 
-def check_not_normalized(last: Any, layout: ObservationLayout, model: Path) -> None:
+def check_not_normalized(last: Any, layout: ObservationLayout, model: Path | None) -> None:
     """Refuse a model whose last observations in training were evidently normalised.
 
     Observations hold the orientations of the joints, quaternions of norm 1.
@@ -143,7 +143,7 @@ def check_not_normalized(last: Any, layout: ObservationLayout, model: Path) -> N
         or their parts.
     layout : ObservationLayout
         Where they are, if they are shown at all.
-    model : Path
+    model : Path, optional
         The model's file.
     """
     shown, place = np.arange(layout.size), layout.places.get("orientation")
@@ -156,7 +156,8 @@ def check_not_normalized(last: Any, layout: ObservationLayout, model: Path) -> N
     changed = np.abs(np.linalg.norm(quaternions, axis=1) - 1) > ROUNDING
     if changed.mean() < 0.5:
         return
-    near = [*model.parent.glob("*vec*normalize*.pkl"), *model.parent.glob("*/vecnormalize.pkl")]
+    places = ("*vec*normalize*.pkl", "*/vecnormalize.pkl")
+    near = [each for place in places if model for each in model.parent.glob(place)]
     file = near[0] if len(near) == 1 else "FILE"
     raise InvalidInputError(
         "the observations of its training were normalised: give their statistics "

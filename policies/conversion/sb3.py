@@ -119,11 +119,9 @@ def _statistics_of(
     statistics = unwrap_vec_normalize(model.env)
     if statistics is not None:
         return statistics, "VecNormalize of its environment"
-    if model.file is None:
-        return None, None
     if layout is not None:
         check_not_normalized(model.attributes.get("_last_obs"), layout, model.file)
-    return None, NONE
+    return None, None if model.file is None else NONE
 
 
 def _actor_pieces(policy: Any) -> Iterator[Piece]:

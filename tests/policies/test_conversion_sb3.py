@@ -181,6 +181,14 @@ class TestNormalization:
         expected = model.predict(other.normalize_obs(observations), deterministic=True)[0]
         np.testing.assert_allclose(policy(observations), expected, rtol=0, atol=1e-5)
 
+    def test_missing_ones_of_a_loaded_model_are_asked_for(self, tmp_path):
+        """Its environment had them, and is not in the file."""
+        make_model("PPO", env=normalized(), n_steps=64).learn(64).save(tmp_path / "model.zip")
+        loaded = sb3.PPO.load(tmp_path / "model.zip", device="cpu")
+        with pytest.raises(InvalidInputError, match="were normalised: give their statistics"):
+            Policy.from_sb3(loaded, "right")
+        assert Policy.from_sb3(loaded, "right", "none").problem == RIGHT
+
     def test_that_of_other_observations_is_refused(self):
         model = make_model("PPO")
         with pytest.raises(InvalidInputError, match="statistics of other observations"):
