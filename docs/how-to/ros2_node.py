@@ -1,14 +1,14 @@
 """A ROS 2 node that runs a policy: put it beside arm_policy.py, in a folder of kinarm-export.
 
-``python ros2_node.py 0.4 -0.5 0.3`` brings the tool to a goal [m]. It needs ROS 2 and NumPy; it has
-no shield, and was not tried on hardware.
+``python ros2_node.py 0.4 -0.5 0.3`` brings the tool to a goal [m], which may go on as the contract
+says. It needs ROS 2 and NumPy; it has no shield, and was not tried on hardware.
 """
 
 import sys
 
 import numpy as np
 import rclpy
-from arm_policy import ArmPolicy, forward_kinematics, from_readings
+from arm_policy import ArmPolicy, from_readings, observe
 from builtin_interfaces.msg import Duration
 from rclpy.node import Node
 from sensor_msgs.msg import JointState
@@ -21,6 +21,13 @@ TOPIC = "/joint_trajectory_controller/joint_trajectory"
 
 STALE = 0.2
 """Age at which readings are no longer believed [s]."""
+
+TURNS = {
+    "direction": ("direction_error", lambda error: 2.0 * np.arcsin(np.linalg.norm(error) / 2.0)),
+    "pose": ("rotation_error", lambda error: 4.0 * np.arcsin(np.linalg.norm(error) / 2.0)),
+    "configuration": ("joints_error", lambda error: np.abs(error).max()),
+}
+"""What the rest of a goal is missed by, and how far that is [rad or m], by the goal's kind."""
 
 
 class PolicyNode(Node):
@@ -52,10 +59,9 @@ class PolicyNode(Node):
             self.get_logger().error(f"joint states are {age:.2f} s old: stopped")
             self.policy.reset()
             return
-        joints = from_readings(self.policy.arm, np.array(self.readings))
-        tool = forward_kinematics(np, self.policy.arm, joints)[3]
-        distance = np.linalg.norm(np.array(self.goal[:3]) - tool)
-        if distance <= self.policy.contract["goal"]["tolerance"]:
+        distance, turn = self.missing()
+        wanted = self.policy.contract["goal"]
+        if distance <= wanted["tolerance"] and turn <= wanted["rotation_tolerance"]:
             self.reached = True
             self.get_logger().info(f"reached, {distance:.3f} m from the goal")
             return
@@ -66,6 +72,14 @@ class PolicyNode(Node):
             time_from_start=Duration(sec=int(seconds), nanosec=round(part * 1e9)),
         )
         self.publisher.publish(JointTrajectory(joint_names=self.names, points=[point]))
+
+    def missing(self):
+        """Distance of the tool from the goal [m], and how far it is turned from it [rad or m]."""
+        joints = from_readings(self.policy.arm, np.array(self.readings))
+        name, turn = TURNS.get(self.policy.contract["goal"]["kind"], ("goal", lambda _: 0.0))
+        shown = ["goal_minus_tool", name]
+        error = observe(np, self.policy.arm, shown, joints, joints, np.array(self.goal))
+        return np.linalg.norm(error[:3]), turn(error[3:])
 
 
 if __name__ == "__main__":

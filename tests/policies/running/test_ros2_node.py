@@ -9,9 +9,11 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from random_policies import policy_for
 
-from kinarm import Arm
+from kinarm import Arm, ReachProblem
 from kinarm.policies import export_policy, load_policy
+from kinarm.world import World
 
 NODE = Path(__file__).resolve().parents[3] / "docs" / "how-to" / "ros2_node.py"
 
@@ -48,8 +50,9 @@ class FakeTime(float):
 
 
 @pytest.fixture
-def node(tmp_path, monkeypatch):
-    export_policy(load_policy("ppo-best-both"), tmp_path / "out", onnx=False)
+def make(tmp_path, monkeypatch):
+    """A node for a policy and a goal."""
+    (tmp_path / "out").mkdir()
     shutil.copy(NODE, tmp_path / "out")
     message = lambda **fields: SimpleNamespace(**fields)  # noqa: E731
     modules = {
@@ -65,9 +68,18 @@ def node(tmp_path, monkeypatch):
         monkeypatch.setitem(sys.modules, name, module)
     monkeypatch.syspath_prepend(str(tmp_path / "out"))
     monkeypatch.delitem(sys.modules, "arm_policy", raising=False)
-    goal = [0.4, -0.5, 0.3]
-    yield runpy.run_path(str(tmp_path / "out" / NODE.name))["PolicyNode"](goal)
+
+    def made(policy, goal):
+        export_policy(policy, tmp_path / "out", onnx=False, overwrite=True)
+        return runpy.run_path(str(tmp_path / "out" / NODE.name))["PolicyNode"](goal)
+
+    yield made
     sys.modules.pop("arm_policy", None)
+
+
+@pytest.fixture
+def node(make):
+    return make(load_policy("ppo-best-both"), [0.4, -0.5, 0.3])
 
 
 def say(node, q, at):
@@ -94,6 +106,24 @@ def test_reaches_the_goal(node):
         assert (point.time_from_start.sec, point.time_from_start.nanosec) == (0, 100_000_000)
     assert node.reached
     assert np.linalg.norm(Arm.load("paper").tool_position(node.q) - node.goal) <= 0.05
+
+
+@pytest.mark.parametrize("kind", ["direction", "pose", "configuration"])
+def test_a_tool_that_is_turned_otherwise_has_not_reached(make, kind):
+    """The turn is kinarm's own, and decides with the distance."""
+    problem = ReachProblem.load("both").replace(goal={"kind": kind})
+    world, rng = World(problem), np.random.default_rng(0)
+    q = rng.uniform(-0.5, 0.5, (40, 6))
+    others = world.reached(q + rng.uniform(-0.12, 0.12, (40, 6)))
+    others[:, :3] = world.reached(q)[:, :3]
+    expected = world.at_goals(world.reached(q), others)
+    assert 0 < expected.sum() < 40
+    node = make(policy_for(problem), None)
+    for joints, goal, there in zip(q, others.tolist(), expected, strict=True):
+        node.goal, node.reached = goal, False
+        say(node, joints, 0.0)
+        node.timer()
+        assert node.reached == there
 
 
 def test_old_readings_stop_it(node):
