@@ -92,8 +92,8 @@ class ArmOptions(ProblemOptions):
         if self.backend == "mujoco":
             bandwidth = plant.range_of("bandwidth")[0] or BANDWIDTH
             return WiredArm(MujocoArm(world, start, bandwidth), world)
-        if self.address is None:
-            raise InvalidInputError(f"--backend {self.backend} needs --address")
+        if self.address is None or self.plant is not None:
+            raise InvalidInputError(f"--backend {self.backend} needs --address, and has no --plant")
         make = URArm if self.backend == "ur" else SOArm
         return WiredArm(make(self.address), world, wiring)
 

@@ -111,6 +111,7 @@ class TestStops:
         ((POLICY, "--backend", "fake", "--goal", 3, 3), "a goal is 3 numbers, got 2"),
         ((POLICY, "--backend", "fake", "--speed", 2), "speed must lie in (0, 1]"),
         ((POLICY, "--backend", "ur"), "needs --address"),
+        ((POLICY, "--backend", "ur", "--address", "a", "--plant", "ur"), "has no --plant"),
         ((POLICY, "--backend", "fakes"), "invalid choice"),
         ((POLICY,), "--backend"),
         (("random", "--backend", "fake"), "'random' is no trained policy"),
