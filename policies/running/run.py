@@ -110,8 +110,12 @@ class Run:
         """
         aims = self._checked(goals)
         with self.arm.connected(self.rate) as arm:
-            self._told = self._start(arm.read())
+            reading = arm.read()
+            self._told = self._start(reading)
             self._rehearse(aims[0])
+            off, fastest = self._told - reading, self.speed * self.simulator.arm.velocity_limits
+            cycles = math.ceil(np.abs(off / fastest).max() * self.rate)
+            arm.followed(reading + np.linspace(0.0, 1.0, cycles + 1)[1:, None] * off)
             for goal in aims:
                 self._reach(goal)
         return self.recordings
@@ -179,8 +183,8 @@ class Run:
             states.append(self._settled())
             raise
         finally:
-            aims = [*aims, episodes.goal[0].copy()][: len(states)]
             path = np.array(states or [self._told])
+            aims = [*aims, episodes.goal[0].copy()][: len(path)]
             self.recordings.append(self._recording(goal, episodes, path, np.array(aims), stopped))
 
     def _follow(self, episodes: Episodes, states: list[Array], aims: list[Array]) -> None:
@@ -221,7 +225,6 @@ class Run:
     ) -> Recording:
         """What the joints did for a goal; ``ended`` of its provenance says how it ended."""
         world, task, contact = self.simulator.world, self.simulator.task, None
-        aims = aims if len(aims) == len(path) else np.tile(goal, (len(path), 1))
         there = world.at_goals(world.reached(path[-1:])[0], aims[-1])
         outcome: Outcome = "truncated"
         ended = stopped or f"not reached in {len(path) - 1} steps"

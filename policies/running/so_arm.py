@@ -60,9 +60,8 @@ class SOArm(Backend):
 
     def command(self, positions: Array) -> None:
         """Set the servos' goals."""
-        goals = np.rad2deg(positions).tolist()
-        named = zip(self.joint_names, goals, strict=True)
-        self._robot.send_action({f"{name}.pos": goal for name, goal in named})
+        goals = zip(self.joint_names, np.rad2deg(positions).tolist(), strict=True)
+        self._robot.send_action({f"{name}.pos": goal for name, goal in goals})
 
     def stop(self) -> None:
         """Hold the joints where they are."""

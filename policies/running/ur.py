@@ -51,8 +51,7 @@ class URArm(Backend):
 
     def command(self, positions: Array) -> None:
         """Follow positions; speed and acceleration of ``servoJ`` have no effect."""
-        servo = self._period, LOOKAHEAD, GAIN
-        if not self._control.servoJ(positions.tolist(), 0.0, 0.0, *servo):
+        if not self._control.servoJ(positions.tolist(), 0.0, 0.0, self._period, LOOKAHEAD, GAIN):
             raise ConnectionError("its controller refuses commands")
 
     def stop(self) -> None:

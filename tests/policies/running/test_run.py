@@ -139,6 +139,16 @@ class TestMotion:
             expected = runtime.command(reading, trial[1][0])
             np.testing.assert_allclose(command, expected, rtol=0, atol=1e-9)
 
+    def test_a_start_a_little_beyond_the_limits(self, make, simulator, trial):
+        """As arms rest that have settled at a stop: commands lead back at the run's speed."""
+        arm, off, told = simulator.arm, 0.1 * (np.arange(6) == 0), Told()
+        start = np.where(off, arm.upper, arm.home)
+        run = make(start=start, reads=lambda q: q + off * (len(told.positions) < 8), takes=told)
+        run.to_goals(trial[1][:1])
+        moves = np.diff(np.vstack([start + off, told.positions]), axis=0)
+        fastest = run.speed * arm.velocity_limits / run.rate
+        assert (np.abs(moves) <= fastest + 1e-12).all()
+
     def test_a_goal_is_the_last_of_its_episode(self, make, policy, simulator, trial):
         """A task's sequence does not go on to goals that nobody named."""
         follow = simulator.changed(goal={"sequence": 3})
