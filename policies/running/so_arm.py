@@ -48,10 +48,8 @@ class SOArm(Backend):
         """Connect to the bus; the arm must be calibrated, and is held where it is."""
         self._robot.connect(calibrate=False)
         if not self._robot.is_calibrated:
-            raise ConnectionError(
-                f"it has no calibration of the name {self._name}: run lerobot-calibrate with "
-                f"--robot.id={self._name}"
-            )
+            asked = f"run lerobot-calibrate with --robot.id={self._name}"
+            raise ConnectionError(f"it is not calibrated: {asked}")
 
     def read(self) -> Array:
         """Present positions of the servos."""

@@ -4,10 +4,12 @@ from collections import deque
 from dataclasses import dataclass, field
 
 import numpy as np
+from numpy.typing import NDArray
 
 from kinarm._fields import Checked
 from kinarm.errors import FROM_ZERO, NOT_NEGATIVE, POSITIVE, RunStoppedError
-from kinarm.kernels.compiling import Array
+
+Array = NDArray[np.float64]
 
 WINDOW, SLACK = 0.1, 0.1
 """Time over which speeds are measured [s], and by how much they may exceed limits [per s]."""
