@@ -97,7 +97,7 @@ class Run:
         self._limits, self._told = limits or SafeLimits(), np.zeros(0)
 
     def to_goals(self, goals: ArrayLike) -> list[Recording]:
-        """Bring the arm to goals, shape (n, goal_width), one after the other.
+        """Bring the arm to goals, shape (n, goal_width), one after the other; their recordings.
 
         Raises
         ------
@@ -118,7 +118,7 @@ class Run:
             arm.followed(reading + np.linspace(0.0, 1.0, cycles + 1)[1:, None] * off)
             for goal in aims:
                 self._reach(goal)
-        return self.recordings
+        return self.recordings[-len(aims) :]
 
     def _checked(self, goals: ArrayLike) -> Array:
         """Goals, each of which the arm reaches somehow without contact."""

@@ -164,6 +164,12 @@ class TestMotion:
         assert kept[1].same_trial(made[1])
         np.testing.assert_allclose(kept[1].states[0], kept[0].states[-1], rtol=0, atol=1e-9)
 
+    def test_a_run_goes_on_to_further_goals(self, make, trial):
+        run = make()
+        (first,), (second,) = (run.to_goals(goal[None]) for goal in trial[1][:2])
+        assert [first, second] == run.recordings
+        assert (first.trial, second.trial) == (0, 1)
+
     def test_shield_keeps_from_contact(self, policy, simulator):
         """A policy that runs into itself or a bench is stopped, or led around."""
         bare, rng = simulator.shielded(False), np.random.default_rng(5)
