@@ -9,11 +9,15 @@ from kinarm.errors import InvalidInputError
 from kinarm.kernels.compiling import Array
 from kinarm.policies.running.backend import Backend
 
+STEPS = 4095
+"""Steps of a servo in a turn, as LeRobot counts them."""
+
 
 class SOArm(Backend):
     """A follower arm SO-101 of LeRobot; the gripper is left alone.
 
-    LeRobot has joints in degrees from the middle of the calibrated range.
+    LeRobot has joints in degrees from the middle of the calibrated range, or
+    normalised to -100 to 100 over it.
 
     Parameters
     ----------
@@ -21,6 +25,8 @@ class SOArm(Backend):
         Its serial port.
     name : str
         Name of its calibration, LeRobot's ``id``.
+    degrees : bool
+        Whether LeRobot is to use degrees.
     """
 
     joint_names: tuple[str, ...] = (
@@ -31,7 +37,7 @@ class SOArm(Backend):
         "wrist_roll",
     )
 
-    def __init__(self, address: str, name: str = "kinarm") -> None:
+    def __init__(self, address: str, name: str = "kinarm", *, degrees: bool = True) -> None:
         try:
             library = import_module("lerobot.robots.so_follower")
         except ImportError as error:
@@ -39,10 +45,11 @@ class SOArm(Backend):
                 "lerobot is not installed: pip install 'lerobot[feetech]>=0.6'"
             ) from error
         config = library.SO101FollowerConfig(
-            port=address, id=name, use_degrees=True, disable_torque_on_disconnect=False
+            port=address, id=name, use_degrees=degrees, disable_torque_on_disconnect=False
         )
         self._robot: Any = library.SO101Follower(config)
-        self._name = name
+        self._unit = np.full(len(self.joint_names), np.deg2rad(1.0))
+        self._name, self._degrees = name, degrees
 
     def connect(self, period: float) -> None:  # noqa: ARG002
         """Connect to the bus; the arm must be calibrated, and is held where it is."""
@@ -50,16 +57,23 @@ class SOArm(Backend):
         if not self._robot.is_calibrated:
             asked = f"run lerobot-calibrate with --robot.id={self._name}"
             raise ConnectionError(f"it is not calibrated: {asked}")
+        if not self._degrees:
+            for joint, name in enumerate(self.joint_names):
+                known = self._robot.calibration[name]
+                turn = 2.0 * np.pi * (known.range_max - known.range_min) / STEPS / 200.0
+                self._unit[joint] = -turn if known.drive_mode else turn
 
     def read(self) -> Array:
         """Present positions of the servos."""
         seen = self._robot.get_observation()
-        return np.deg2rad([float(seen[f"{name}.pos"]) for name in self.joint_names])
+        positions = np.array([seen[f"{name}.pos"] for name in self.joint_names], dtype=float)
+        return np.asarray(positions * self._unit)
 
     def command(self, positions: Array) -> None:
         """Set the servos' goals."""
-        goals = zip(self.joint_names, np.rad2deg(positions).tolist(), strict=True)
-        self._robot.send_action({f"{name}.pos": goal for name, goal in goals})
+        goals = (positions / self._unit).tolist()
+        named = zip(self.joint_names, goals, strict=True)
+        self._robot.send_action({f"{name}.pos": goal for name, goal in named})
 
     def stop(self) -> None:
         """Hold the joints where they are."""

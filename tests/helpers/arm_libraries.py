@@ -2,6 +2,8 @@
 
 from types import SimpleNamespace
 
+import numpy as np
+
 
 class FakeRTDE:
     """Both interfaces of ``ur_rtde`` 1.6 to one arm, which obeys at once."""
@@ -51,7 +53,6 @@ class FakeSO101:
     names = ("shoulder_pan", "shoulder_lift", "elbow_flex", "wrist_flex", "wrist_roll")
 
     def __init__(self, config):
-        assert config.use_degrees
         self.config, self.is_connected, self.is_calibrated = config, False, True
         self.steps = {
             name: 0.5 * sum(held) for name, held in zip(self.names, self.ranges, strict=True)
@@ -80,12 +81,19 @@ class FakeSO101:
         for key, value in action.items():
             name = key.removesuffix(".pos")
             known = self.calibration[name]
-            self.steps[name] = value * 4095 / 360 + 0.5 * (known.range_min + known.range_max)
+            if self.config.use_degrees:
+                middle = 0.5 * (known.range_min + known.range_max)
+                self.steps[name] = value * 4095 / 360 + middle
+            else:
+                share = (np.clip(value, -100, 100) + 100) / 200
+                self.steps[name] = share * (known.range_max - known.range_min) + known.range_min
         return action
 
     def unit(self, name, step):
         known = self.calibration[name]
-        return (step - 0.5 * (known.range_min + known.range_max)) * 360 / 4095
+        if self.config.use_degrees:
+            return (step - 0.5 * (known.range_min + known.range_max)) * 360 / 4095
+        return (step - known.range_min) / (known.range_max - known.range_min) * 200 - 100
 
 
 def fake_lerobot():
