@@ -11,7 +11,7 @@ from kinarm.problem import PROBLEMS, ReachProblem
 from kinarm.problem_options import ProblemOptions, say_choices
 from kinarm.scene import Scene
 from kinarm.simulator import Simulator
-from kinarm.task import ReachTask, RewardWeights, Stepping
+from kinarm.task import RewardWeights, Stepping
 
 RIGHT = PROBLEMS["right"]
 
