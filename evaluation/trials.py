@@ -83,7 +83,7 @@ class TrialSet:
 
     def with_tolerance(self, tolerance: float) -> "TrialSet":
         """The same starts and goals with another tolerance [m]."""
-        return replace(self, simulator=self.simulator.with_tolerance(tolerance))
+        return replace(self, simulator=self.simulator.changed(tolerance=tolerance))
 
     def __len__(self) -> int:
         return len(self.starts)

@@ -14,7 +14,6 @@ from kinarm.errors import InvalidInputError, finite_array
 from kinarm.kernels.compiling import Array
 from kinarm.kernels.rollout import results_of_step
 from kinarm.networks import CompiledPolicy, Networks, PolicyFunction, network_control
-from kinarm.observation_choice import Observation
 from kinarm.plant import Plant
 from kinarm.problem import ProblemLike, ReachProblem
 from kinarm.scenarios import draw_scenarios
@@ -161,12 +160,8 @@ class Simulator(EpisodeRunner):
         return other
 
     def changed(self, **changes: Any) -> "Simulator":
-        """Another simulator of the same world with other settings; see `kinarm.World.changed`."""
+        """Another simulator of the world with other settings; see `kinarm.World.changed`."""
         return self._in(self.world.changed(**changes))
-
-    def with_tolerance(self, tolerance: float) -> "Simulator":
-        """Another simulator of the same world with another tolerance [m]."""
-        return self.changed(tolerance=tolerance)
 
     def in_scene(self, start: ArrayLike, goal: ArrayLike) -> "Simulator":
         """The simulator of one episode; see `kinarm.World.in_scene`."""
@@ -179,10 +174,6 @@ class Simulator(EpisodeRunner):
     def shielded(self, shield: bool = True) -> "Simulator":
         """The same simulator with or without a shield."""
         return self.changed(shield=shield)
-
-    def seen_as(self, observation: Observation) -> "Simulator":
-        """The same simulator with another observation; ProblemError if it cannot have it."""
-        return self.changed(observation=observation)
 
     def without_moving_bodies(self) -> "Simulator":
         """The same simulator without the bodies that move."""
@@ -316,7 +307,7 @@ class Simulator(EpisodeRunner):
         """The simulator that policies act in: with their own observation and shield, if any."""
         own, seen = self, getattr(policies, "observation", self.problem.observation)
         if seen != self.problem.observation:
-            own = own.seen_as(seen)
+            own = own.changed(observation=seen)
         if getattr(policies, "shield", False) and not self.problem.stepping.shield:
             own = own.shielded()
         return own

@@ -83,8 +83,7 @@ class Policy:
             width = len(weights)
             bias = finite_array(f"bias of layer {number}", layer.bias, (width,))
             layers.append(Layer(weights, bias))
-        mirror = self.mirror
-        if mirror is not None:
+        if (mirror := self.mirror) is not None:
             mirror = Mirror(
                 finite_array("mirror of observations", mirror.observations, mean.shape),
                 finite_array("mirror of actions", mirror.actions, (width,)),
@@ -164,7 +163,7 @@ class Policy:
             Of no effect; the state is returned as it is.
         """
         if isinstance(observation, Mapping):
-            observation = self.layout.flat(observation)
+            return self(self.layout.flat(observation)), state
         return self(observation), state
 
     def networks(self) -> Networks:

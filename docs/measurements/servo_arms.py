@@ -185,7 +185,7 @@ def run(
     known = Plant()
     if manner.shield == "joints":
         known = replace(simulator.problem.plant, noise=0.0)
-    shield = simulator.with_plant(known).with_tolerance(NEVER).shielded()
+    shield = simulator.changed(plant=known, tolerance=NEVER, shield=True)
     told = shield.reset(starts, goals)
     arms.begin(starts)
     horizon = round(task.horizon / manner.speed)

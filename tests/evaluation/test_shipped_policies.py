@@ -117,7 +117,7 @@ def test_symmetric_policies_treat_mirror_images_alike():
     trials = TrialSet.draw("both", 100, seed=12345)
     for name in SYMMETRIC:
         policy = load_policy(name)
-        world = trials.simulator.seen_as(policy.observation).world
+        world = trials.simulator.changed(observation=policy.observation).world
         mirror, observed = find_mirror(world), world.observe(trials.starts, trials.goals)
         image, actions = policy(observed * mirror.observations), policy(observed)
         np.testing.assert_allclose(image, actions * mirror.actions, atol=1e-12, err_msg=name)

@@ -366,7 +366,7 @@ def test_kernels_are_compiled_once_for_all(simulators, scenarios):
 
 
 def test_with_another_tolerance_it_is_as_if_built_so(simulator):
-    other, built = simulator.with_tolerance(0.3), changed(simulator, tolerance=0.3)
+    other, built = simulator.changed(tolerance=0.3), changed(simulator, tolerance=0.3)
     assert other.problem == built.problem
     draws = [each.sample(np.random.default_rng(4), 60) for each in (other, built)]
     for first, second in zip(*draws, strict=True):

@@ -95,6 +95,6 @@ def test_goals_are_met_closely_before_anything_is_learnt():
     config = recipe("ppo", "best", problem="both", iterations=1)
     state = next(iter(training_states(config, None)))
     policy = state_policy(config, state)
-    simulator = Simulator(PROBLEM, threads=1).with_tolerance(0.001).shielded()
+    simulator = Simulator(PROBLEM, threads=1).changed(tolerance=0.001).shielded()
     rollouts = simulator.rollout(policy, *simulator.sample(np.random.default_rng(4), N))
     assert 0.4 < rollouts.success.mean() < 0.9
