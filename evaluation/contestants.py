@@ -103,8 +103,7 @@ class Contestant:
         """A policy that learnt behind a shield without it; what others are called stays."""
         if self.policy is None or not self.policy.shield:
             return self
-        bare = replace(self.policy, shield=False)
-        return self.from_policy(bare_name(self.name), bare, self.source)
+        return replace(self, name=bare_name(self.name), has_shield=False)
 
     @property
     def note(self) -> str:
@@ -188,16 +187,16 @@ class Contestant:
         source : Path, optional
             The file that it was read from.
         """
-        made = policy.provenance
+        made, bare = policy.provenance, replace(policy, shield=False)
         entered = cls(
             name,
-            partial(_run, policy),
+            partial(_run, bare),
             made.algorithm,
             made.recipe,
             made.seed,
             policy,
             source,
-            actor=Actor(policy),
+            actor=Actor(bare),
         )
         return entered.shielded() if policy.shield else entered
 

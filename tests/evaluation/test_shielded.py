@@ -1,5 +1,8 @@
 """Policies behind a shield: their names, figures, recordings and files."""
 
+from dataclasses import replace
+
+import gymnasium
 import numpy as np
 import pytest
 
@@ -13,6 +16,10 @@ from kinarm.policies import Policy, PPOConfig, load_policy, train_policy
 from kinarm.recording import load_recordings, record_rollouts, save_recordings
 
 NAME = "ars-linear-both-seed0"
+
+
+def half_speed(env):
+    return gymnasium.wrappers.TransformAction(env, lambda action: action / 2, env.action_space)
 
 
 @pytest.fixture(scope="module")
@@ -74,6 +81,17 @@ def test_what_learnt_behind_a_shield_keeps_it_and_is_shown_without_it_too(tmp_pa
     assert (bare.name, safe.name) == ("mine", "mine+shield")
     assert bare.rollouts.interventions.shape == (0,)
     assert not safe.rollouts.collision.any()
+    # Both in the wrapper, if there is one.
+    half = replace(request, wrapper=f"{__name__}:half_speed")
+    bare, safe = half.evaluate()
+    assert (bare.name, safe.name) == ("mine", "mine+shield")
+    for each in (bare, safe):
+        assert each.contestant.note.endswith(half.wrapper)
+    assert bare.rollouts.interventions.shape == (0,)
+    expected = evaluate(load_policy(tmp_path / "mine.npz"), trials=100, wrapper=half_speed)
+    np.testing.assert_array_equal(safe.rollouts.distance, expected.rollouts.distance)
+    moved = np.abs(bare.rollouts.configurations - bare.rollouts.starts).max(axis=1)
+    assert (moved <= bare.rollouts.steps * bare.trials.simulator.step_limit.max() / 2).all()
 
 
 def test_replaced_steps_stand_in_tables_where_there_is_a_shield():
