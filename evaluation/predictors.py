@@ -103,10 +103,12 @@ def run_remembering(actor: Actor, trials: TrialSet, *, record: bool = False) -> 
 def run_wrapped(
     actor: Actor, wrapper: Wrapper, trials: TrialSet, *, record: bool = False
 ) -> Rollouts:
-    """Run trials in a wrapper, and then the actions that arrived at the arm."""
+    """Run trials in a wrapper, around what a policy sees, and then the actions that arrived."""
     parameters = [*inspect.signature(wrapper).parameters]
     run = _in_batch if parameters[:1] == ["venv"] else _one_by_one
     simulator = trials.simulator
+    if isinstance(actor.policy, Policy):
+        trials = replace(trials, simulator=simulator.seen_as(actor.policy.observation))
     actions = np.zeros((len(trials), simulator.task.horizon, simulator.n_actions))
     run(actor, wrapper, trials, actions)
     return simulator.rollout_actions(actions, trials.starts, trials.goals, record=record)

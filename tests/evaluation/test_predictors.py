@@ -231,6 +231,17 @@ class TestWrapper:
         assert ends_of(evaluation) == expected
         assert any(success for _, success, _ in expected)
 
+    @pytest.mark.parametrize("kind", ["gymnasium", "sb3"])
+    def test_shows_a_policy_what_it_learnt_to_see(self, kind):
+        pytest.importorskip("stable_baselines3")
+        wrapper = (lambda env: env) if kind == "gymnasium" else (lambda venv: venv)
+        policy = load_policy("ppo-best-both-seed0")
+        assert policy.observation != PROBLEMS["right"].observation
+        expected = evaluate(policy, "right", TRIALS, SEED).rollouts
+        found = evaluate(policy, "right", TRIALS, SEED, wrapper=wrapper).rollouts
+        np.testing.assert_array_equal(found.outcomes, expected.outcomes)
+        np.testing.assert_allclose(found.distance, expected.distance, rtol=0, atol=1e-4)
+
     def test_by_name(self, tmp_path, monkeypatch):
         monkeypatch.chdir(tmp_path)
         (tmp_path / "halves_for_tests.py").write_text(
