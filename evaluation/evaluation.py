@@ -181,7 +181,7 @@ def evaluate(
     allow_other_arm: bool = False,
     oracle: bool = False,
     hold: bool = False,
-    wrapper: Wrapper | None = None,
+    wrapper: str | Wrapper | None = None,
     **overrides: Any,
 ) -> Evaluation:
     """Evaluate one policy on the trials (paper, section 3.3: 200 random goals, 64 steps each).
@@ -202,7 +202,7 @@ def evaluate(
         Whether to bound what any policy could do, in 2000 trials at most.
     hold : bool
         Whether to run the trials once more without an end at success.
-    wrapper : callable, optional
+    wrapper : str or callable, optional
         The policy faces the trials in it; see `find_contestants`.
     **overrides
         Changes of the problem, such as ``tolerance``; see

@@ -70,14 +70,16 @@ def find_contestants(
         found = (_entered(text, _imported(text, "policy")),)
     else:
         found = _policy_contestants(name_or_file)
-    if wrapper is None:
-        return found
-    if callable(wrapper):
-        return tuple(each.in_wrapper(wrapper, _name_of(wrapper)) for each in found)
-    function = _imported(wrapper, "wrapper")
+    return found if wrapper is None else tuple(_in_wrapper(each, wrapper) for each in found)
+
+
+def _in_wrapper(contestant: Contestant, wrapper: str | Wrapper) -> Contestant:
+    """A contestant in a wrapper: a function, or its ``module:function``."""
+    function = _imported(wrapper, "wrapper") if isinstance(wrapper, str) else wrapper
+    name = wrapper if isinstance(wrapper, str) else _name_of(wrapper)
     if not callable(function):
-        raise InvalidInputError(f"wrapper {wrapper!r} is no function: it is {function!r}")
-    return tuple(each.in_wrapper(function, wrapper) for each in found)
+        raise InvalidInputError(f"wrapper {name!r} is no function: it is {function!r}")
+    return contestant.in_wrapper(function, name)
 
 
 def _entered(name: str, policy: Policy | PolicyFunction | Predictor) -> Contestant:
@@ -119,14 +121,13 @@ def check_normalizing(contestants: Iterable[Contestant], vec_normalize: str | Pa
 def contestant_of(
     policy: str | Path | Policy | Contestant | PolicyFunction | Predictor,
     problem: ProblemLike | None,
-    wrapper: Wrapper | None = None,
+    wrapper: str | Wrapper | None = None,
 ) -> Contestant:
     """Enter a policy, the first of a name or file, or a function."""
     if isinstance(policy, str | Path):
         return find_contestants(policy, problem, wrapper=wrapper)[0]
-    if wrapper is not None:
-        return contestant_of(policy, problem).in_wrapper(wrapper, _name_of(wrapper))
-    return policy if isinstance(policy, Contestant) else _entered(_name_of(policy), policy)
+    known = policy if isinstance(policy, Contestant) else _entered(_name_of(policy), policy)
+    return known if wrapper is None else _in_wrapper(known, wrapper)
 
 
 def _model_contestant(

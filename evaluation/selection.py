@@ -87,7 +87,7 @@ def _shipped(request: "EvaluationRequest", named: list[ReachProblem]) -> list[Co
         contestant
         for name in policy_names()
         if group_of(name).rpartition("-")[2] in serving
-        for contestant in find_contestants(name)
+        for contestant in find_contestants(name, wrapper=request.wrapper)
     ]
     return [*shipped, *BASELINES.values()]
 

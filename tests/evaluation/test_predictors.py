@@ -7,7 +7,8 @@ import pytest
 from kinarm.envs import ReachEnv
 from kinarm.episodes import SUCCESS
 from kinarm.errors import InvalidInputError
-from kinarm.evaluation import TrialSet, evaluate, find_contestants
+from kinarm.evaluation import EvaluationRequest, TrialSet, evaluate, find_contestants
+from kinarm.evaluation.selection import select_pairs
 from kinarm.policies import load_policy
 from kinarm.problem import PROBLEMS
 
@@ -255,5 +256,13 @@ class TestWrapper:
         assert half.note == "ars-tuned-both-seed0: in wrapper halves_for_tests:half"
         slow, fast = (evaluate(each, trials=TRIALS).rollouts.steps for each in (half, half.policy))
         assert slow.mean() > 1.3 * fast.mean()
-        with pytest.raises(InvalidInputError, match="wrapper .* is no function"):
-            find_contestants("random", wrapper="halves_for_tests:number")
+        again = evaluate(half.policy, trials=TRIALS, wrapper="halves_for_tests:half")
+        np.testing.assert_array_equal(again.rollouts.steps, slow)
+        for name in ("random", half.policy):
+            with pytest.raises(InvalidInputError, match="wrapper .* is no function"):
+                evaluate(name, "right", wrapper="halves_for_tests:number")
+        # Also around what nobody named.
+        request = EvaluationRequest(problems=("left",), wrapper="halves_for_tests:half")
+        chosen = {contestant.name: contestant for contestant, _ in select_pairs(request)}
+        assert chosen["ars-best-both-seed0"].wrapped
+        assert not chosen["random"].wrapped
