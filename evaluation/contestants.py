@@ -91,9 +91,9 @@ class Contestant:
     def shielded(self) -> "Contestant":
         """The same behind a shield (``kinarm.shield``), under a name of its own.
 
-        What is not trained stays as it is.
+        The oracle stays as it is: its motions touch nothing.
         """
-        if self.has_shield or self in UNTRAINED.values():
+        if self.has_shield or self is ORACLE:
             return self
         group = group_of(self.name)
         name = f"{group}{SHIELDED}{self.name.removeprefix(group)}"

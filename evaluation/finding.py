@@ -15,7 +15,7 @@ from kinarm.networks import PolicyFunction
 from kinarm.policies.conversion.models import saved_model
 from kinarm.policies.conversion.sb3 import native_statistics
 from kinarm.policies.learners import look_here
-from kinarm.policies.library import models_in, policy_files
+from kinarm.policies.library import group_of, models_in, policy_files
 from kinarm.policies.policy import Policy
 from kinarm.policies.provenance import normalization_remark
 from kinarm.problem import ProblemLike
@@ -80,6 +80,16 @@ def _in_wrapper(contestant: Contestant, wrapper: str | Wrapper) -> Contestant:
     if not callable(function):
         raise InvalidInputError(f"wrapper {name!r} is no function: it is {function!r}")
     return contestant.in_wrapper(function, name)
+
+
+def is_called(contestant: Contestant, text: str) -> bool:
+    """Whether a name, or a file or folder, stands for a contestant, as in `find_contestants`."""
+    if text in (contestant.name, group_of(contestant.name)):
+        return True
+    if SHIELDED in text and not Path(text).exists():
+        return contestant.has_shield and is_called(contestant, bare_name(text))
+    path, source = Path(text).resolve(), contestant.source
+    return source is not None and path in (source, source.parent)
 
 
 def _entered(name: str, policy: Policy | PolicyFunction | Predictor) -> Contestant:

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from kinarm.errors import InvalidInputError
-from kinarm.evaluation.contestants import BASELINES, ORACLE, Contestant
+from kinarm.evaluation.contestants import BASELINES, ORACLE, UNTRAINED, Contestant
 from kinarm.evaluation.finding import check_normalizing, find_contestants
 from kinarm.policies.library import group_of, is_shipped, policy_names
 from kinarm.problem import PROBLEMS, ReachProblem
@@ -40,7 +40,7 @@ def select_pairs(request: "EvaluationRequest") -> list[Pair]:
     behind = [
         each.shielded()
         for each, without in zip(chosen, bare, strict=True)
-        if request.shield
+        if (request.shield and each not in UNTRAINED.values())
         or each is not without
         or (each.recipe == SHOWN_SHIELDED and not request.policies)
     ]
@@ -100,13 +100,6 @@ def _named_contestants(request: "EvaluationRequest", named: list[ReachProblem]) 
         chosen = find_contestants(name, only, request.vec_normalize, request.wrapper)
         found |= {(each.name, each.source): each for each in chosen}
     return named_apart(list(found.values()))
-
-
-def is_called(contestant: Contestant, text: str) -> bool:
-    """Whether a name, or a file or folder, stands for a contestant, as in `find_contestants`."""
-    path, source = Path(text).resolve(), contestant.source
-    called = text in (contestant.name, group_of(contestant.name))
-    return called or (source is not None and path in (source, source.parent))
 
 
 def _problems(request: "EvaluationRequest", chosen: list[Contestant]) -> list[ReachProblem]:

@@ -19,7 +19,8 @@ from kinarm.evaluation.document import (
 )
 from kinarm.evaluation.estimates import estimate_metrics
 from kinarm.evaluation.evaluation import Evaluation, common_figures, outcomes_of
-from kinarm.evaluation.selection import check_names, group_names, is_called
+from kinarm.evaluation.finding import is_called
+from kinarm.evaluation.selection import check_names, group_names
 from kinarm.evaluation.statistics import Estimate
 from kinarm.policies.provenance import package_versions, source_commit
 from kinarm.problem import ReachProblem

@@ -46,7 +46,7 @@ class Group:
     @property
     def is_policy(self) -> bool:
         """Whether it is neither a baseline nor the oracle."""
-        return self.members[0].contestant not in UNTRAINED.values()
+        return self.row.algorithm not in ("baseline", "oracle")
 
     @cached_property
     def distances(self) -> NDArray[np.float64]:

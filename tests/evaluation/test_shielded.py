@@ -55,6 +55,26 @@ def test_what_is_named_with_its_shield_too_comes_once():
     assert names == [NAME, "ars-linear-both+shield-seed0"]
 
 
+@pytest.mark.parametrize("first", ["mine.npz+shield", "random+shield", "mine.npz"])
+def test_what_is_first_is_the_reference_with_its_shield_too(policy, tmp_path, monkeypatch, first):
+    monkeypatch.chdir(tmp_path)
+    policy.save("mine.npz")
+    names = dict.fromkeys((first, "mine.npz+shield", "zero"))
+    request = EvaluationRequest(policies=(*names,), problems=("both",), trials=3, oracle=False)
+    compared = {each.reference for each in request.run().differences}
+    assert compared == {first.replace(".npz", "")}
+
+
+def test_baselines_are_behind_a_shield_if_they_are_named_so():
+    safe, bare = (evaluate(each, "both", trials=200) for each in ("random+shield", "random"))
+    assert (safe.name, safe.rollouts.collision.any()) == ("random+shield", False)
+    assert bare.rollouts.collision.any()
+    request = EvaluationRequest(policies=("random",), shield=True, oracle=False)
+    assert {contestant.name for contestant, _ in select_pairs(request)} == {"random"}
+    replayed = ReplayRequest(policy="random", problem="both", shield=True, trials=3, oracle=False)
+    assert {each.policy for each in replayed.recordings()[0]} == {"random+shield"}
+
+
 def test_wrappers_and_shields_go_together(policy):
     expected = evaluate(policy.shielded(), trials=100)
     assert expected.rollouts.interventions.sum() > 0
