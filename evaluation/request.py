@@ -119,7 +119,7 @@ class EvaluationRequest(ProblemOptions, TableOptions):
     }
     DEFAULTS: ClassVar = {
         **ProblemOptions.DEFAULTS,
-        "policies": "those that ship for the paper's tasks, random and zero",
+        "policies": "those that ship for the paper's tasks and for named problems, random and zero",
         "problems": "what each policy was trained for",
         "columns": "all that fit",
     }

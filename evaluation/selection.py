@@ -14,6 +14,7 @@ from kinarm.evaluation.contestants import BASELINES, ORACLE, UNTRAINED, Contesta
 from kinarm.evaluation.finding import check_normalizing, find_contestants
 from kinarm.policies.library import group_of, is_shipped, policy_names
 from kinarm.problem import PROBLEMS, ReachProblem
+from kinarm.problem_files import problem_names
 
 if TYPE_CHECKING:
     from kinarm.evaluation.request import EvaluationRequest
@@ -77,16 +78,19 @@ def _shipped(request: "EvaluationRequest", named: list[ReachProblem]) -> list[Co
 
     Names say what policies were trained for: others are not opened.
     """
-    serving = {
-        name
-        for name, problem in PROBLEMS.items()
+    known = PROBLEMS | {
+        each.name: ReachProblem.load(each.name) for each in named if each.name in problem_names()
+    }
+    serving = tuple(
+        f"-{name}"
+        for name, problem in known.items()
         if (changed := _changed(request, problem)).arm_digest == problem.arm_digest
         and (not named or any(changed.faced_as(each).covers(each) for each in named))
-    }
+    )
     shipped = [
         contestant
         for name in policy_names()
-        if group_of(name).rpartition("-")[2] in serving
+        if group_of(name).endswith(serving)
         for contestant in find_contestants(name, wrapper=request.wrapper)
     ]
     return [*shipped, *BASELINES.values()]

@@ -10,6 +10,7 @@ from kinarm.evaluation.evaluation import evaluate
 from kinarm.evaluation.request import EvaluationRequest
 from kinarm.evaluation.selection import select_pairs
 from kinarm.policies import recipe, train_policy
+from kinarm.policies.library import group_of
 from kinarm.problem import PROBLEMS
 
 
@@ -30,6 +31,16 @@ def test_a_problem_without_policies_is_told(run):
     answer = run("kinarm-eval", "--problem", "table-paper", "--trials", 1, "--no-oracle")
     assert (answer.status, answer.err) == (0, "")
     assert answer.out.splitlines()[-1] == "no shipped policy was trained for this"
+
+
+def test_what_ships_for_a_problem_takes_part_where_it_is_named():
+    request = EvaluationRequest(problems=("hard-paper", "left"), plant="ideal", oracle=False)
+    groups = {(group_of(each.name), problem.name) for each, problem in select_pairs(request)}
+    assert ("ppo-best-hard-paper", "hard-paper") in groups
+    assert ("ppo-best-both", "left") in groups
+    assert {name for name, problem in groups if problem == "hard-paper"} == {
+        *("ppo-best-hard-paper", "ppo-best-hard-paper+shield", "random", "zero"),
+    }
 
 
 def test_how_steps_were_tested_in_training_is_told(run, tmp_path):
