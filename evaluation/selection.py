@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 from kinarm.errors import InvalidInputError
 from kinarm.evaluation.contestants import BASELINES, ORACLE, UNTRAINED, Contestant
 from kinarm.evaluation.finding import check_normalizing, find_contestants
+from kinarm.observation_choice import Observation
 from kinarm.policies.library import group_of, is_shipped, policy_names
 from kinarm.problem import PROBLEMS, ReachProblem
 from kinarm.problem_files import problem_names
@@ -107,9 +108,13 @@ def _named_contestants(request: "EvaluationRequest", named: list[ReachProblem]) 
 
 
 def _problems(request: "EvaluationRequest", chosen: list[Contestant]) -> list[ReachProblem]:
-    """Problems of the contestants, or all; the paper's come first."""
-    trained = (_changed(request, each.problem) for each in chosen if each.problem)
-    own = {problem.digest: problem for problem in trained}
+    """Problems of the contestants, or all; the paper's come first.
+
+    Of those that differ in what they show alone, the first is faced: all see what they learnt to.
+    """
+    own: dict[str, ReachProblem] = {}
+    for problem in (_changed(request, each.problem) for each in chosen if each.problem):
+        own.setdefault(problem.replace(observation=Observation()).digest, problem)
     changed = (_changed(request, problem) for problem in PROBLEMS.values())
     shipped = {problem.digest: problem for problem in changed}
     if request.matrix or not own:

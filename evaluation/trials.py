@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kinarm.errors import MOST_TRIALS, whole_number
+from kinarm.observation_choice import Observation
 from kinarm.problem import ProblemLike, ReachProblem
 from kinarm.scenarios import draw_for_each
 from kinarm.simulator import Simulator
@@ -98,12 +99,12 @@ class TrialSet:
 
     @property
     def rules(self) -> ReachProblem:
-        """The problem without its reward, by which trials do not differ."""
-        return self.problem.replace(reward=RewardWeights())
+        """The problem without its reward and observation, by which trials do not differ."""
+        return self.problem.replace(reward=RewardWeights(), observation=Observation())
 
     @cached_property
     def digest(self) -> str:
-        """Hash of starts, goals and problem, without its reward."""
+        """Hash of starts, goals and `rules`."""
         numbers = np.round(np.concatenate([self.starts, self.goals], axis=1), 12) + 0.0
         content = self.rules.digest.encode() + numbers.tobytes()
         return hashlib.sha256(content).hexdigest()[:16]

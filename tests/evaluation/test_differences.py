@@ -6,10 +6,13 @@ import numpy as np
 import pytest
 
 from kinarm.errors import InvalidInputError
+from kinarm.evaluation import EvaluationRequest
 from kinarm.evaluation.evaluation import evaluate
 from kinarm.evaluation.metrics import METRICS
 from kinarm.evaluation.statistics import share_difference
 from kinarm.evaluation.summary import evaluation_document, pool
+from kinarm.policies import ARSConfig, train_policy
+from kinarm.problem import PROBLEMS
 from kinarm.task import RewardWeights
 
 
@@ -62,6 +65,32 @@ def test_a_reward_makes_no_other_trials():
     )
     assert first.problem.digest != second.problem.digest
     assert first.difference(second)["success"].value == 0
+
+
+def test_what_is_seen_makes_no_other_trials():
+    wide = PROBLEMS["right"].replace(observation=["goal", "position", "last_action"])
+    first, second = (evaluate("zero", problem, trials=3) for problem in ("right", wide))
+    assert first.trials.digest == second.trials.digest
+    assert first.difference(second)["success"].value == 0
+
+
+def test_policies_of_a_problem_that_see_different_things_are_compared(tmp_path):
+    own = PROBLEMS["right"].replace(name="own", tolerance=0.2)
+    for name, parts in (("one", ["goal", "position"]), ("two", ["goal", "orientation"])):
+        problem = own.replace(observation=parts)
+        config = ARSConfig(problem=problem, iterations=1, directions=1, top_directions=1)
+        train_policy(config).policy.save(tmp_path / f"{name}.npz")
+    names = tuple(str(tmp_path / f"{name}.npz") for name in ("one", "two"))
+    document = EvaluationRequest(policies=names, trials=3, oracle=False).run()
+    assert [(row.policy, row.problem) for row in document.results] == [
+        ("one", "own"),
+        ("two", "own"),
+    ]
+    (difference,) = document.differences
+    assert {difference.policy, difference.reference} == {"one", "two"}
+    for row, name in zip(document.results, names, strict=True):
+        alone = evaluate(name, trials=3).rollouts.distance
+        np.testing.assert_array_equal(row.outcomes.final_distance, alone)
 
 
 def test_documents_hold_what_rows_have_less_the_reference(evaluations):
