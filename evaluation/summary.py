@@ -90,16 +90,16 @@ Faced = Evaluation | PooledEvaluation
 
 
 def pool(evaluations: Sequence[Evaluation]) -> tuple[PooledEvaluation, ...]:
-    """Pool the training seeds of each recipe and problem that has several.
+    """Pool the training seeds of each recipe that faced the same trials.
 
     Groups are those of ``kinarm.evaluation.selection.group_names``.
     """
     names = group_names(evaluation.contestant for evaluation in evaluations)
-    groups: dict[tuple[str, str], list[Evaluation]] = {}
-    for evaluation in evaluations:
-        key = (names[evaluation.contestant.name], evaluation.problem.digest)
-        groups.setdefault(key, []).append(evaluation)
-    several = ((name, members) for (name, _), members in groups.items() if len(members) > 1)
+    groups: dict[tuple[str, ...], list[Evaluation]] = {}
+    for each in evaluations:
+        key = (names[each.name], each.problem.digest, each.trials.digest)
+        groups.setdefault(key, []).append(each)
+    several = ((name, members) for (name, *_), members in groups.items() if len(members) > 1)
     return tuple(PooledEvaluation(name, tuple(members)) for name, members in several)
 
 

@@ -104,6 +104,14 @@ def test_pooling_keeps_problems_apart(skilled):
     ]
 
 
+def test_pooling_keeps_other_trials_apart(evaluations):
+    first, *_ = pool(evaluations)[0].members
+    others = [replace(each, trials=each.trials.first(50)) for each in evaluations]
+    (group,) = pool([first, *(each for each in others if each.name != first.name)])
+    assert [len(each.trials) for each in group.members] == [50, 50]
+    assert first.name not in {each.name for each in group.members}
+
+
 def test_pooled_figures_are_those_of_all_seeds(evaluations):
     members = evaluations[:3]
     document = pool(evaluations)[0].result.to_json()
