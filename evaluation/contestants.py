@@ -23,6 +23,7 @@ from kinarm.policies.library import group_of
 from kinarm.policies.policy import Policy
 from kinarm.policies.provenance import normalization_remark
 from kinarm.problem import PROBLEMS, ReachProblem
+from kinarm.simulator import Simulator
 from kinarm.task import NEVER
 
 SHIELDED = "+shield"
@@ -272,10 +273,12 @@ UNTRAINED = {**BASELINES, ORACLE.name: ORACLE}
 
 
 def measure_holding(contestant: Contestant, trials: TrialSet) -> Holding:
-    """Run trials that success does not end; the oracle aims at `AIM` there."""
-    endless = trials.with_tolerance(NEVER)
+    """Run trials that success does not end, at first goals; the oracle aims at `AIM` there."""
+    endless = replace(trials, simulator=trials.simulator.changed(tolerance=NEVER))
     if contestant is ORACLE:
-        aimed = trials.with_tolerance(min(AIM, trials.problem.task.tolerance))
+        nearer = min(AIM, trials.problem.task.tolerance)
+        aim = trials.problem.replace(tolerance=nearer, goal={"sequence": 1})
+        aimed = replace(trials, simulator=Simulator(aim))
         rollouts = _run_oracle(endless, record=True, aimed=aimed)
     else:
         rollouts = contestant.run(endless, record=True)

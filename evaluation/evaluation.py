@@ -244,5 +244,6 @@ def run_trials(
     hold : bool
         Whether to run the trials once more without an end at success.
     """
+    rollouts = contestant.run(trials)  # first: a function may remember what it did
     holding = measure_holding(contestant, trials) if hold else None
-    return Evaluation(contestant, trials, contestant.run(trials), bounds, holding)
+    return Evaluation(contestant, trials, rollouts, bounds, holding)

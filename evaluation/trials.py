@@ -82,10 +82,6 @@ class TrialSet:
         """The first trials, or all if there are fewer."""
         return self if len(self) <= count else self.chosen(range(count))
 
-    def with_tolerance(self, tolerance: float) -> "TrialSet":
-        """The same starts and goals with another tolerance [m]."""
-        return replace(self, simulator=self.simulator.changed(tolerance=tolerance))
-
     def __len__(self) -> int:
         return len(self.starts)
 

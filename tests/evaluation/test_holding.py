@@ -13,7 +13,9 @@ from kinarm.evaluation.evaluation import run_trials
 from kinarm.evaluation.finding import find_contestants
 from kinarm.evaluation.metrics import CLOSE, HOLDING_WITHIN
 from kinarm.evaluation.outcomes import HOLDING_STEPS, Holding
+from kinarm.evaluation.trials import TrialSet
 from kinarm.policies import load_policy
+from kinarm.problem import PROBLEMS
 
 
 @pytest.fixture(scope="module")
@@ -91,6 +93,26 @@ def test_the_oracle_aims_closer_and_stays(trials):
     assert (held.closest <= AIM + 1e-9).all()
     assert (held.farthest_at_end <= AIM + 1e-9).all()
     assert not held.collision.any()
+
+
+def test_of_goals_that_follow_each_other_the_first_is_held():
+    one, three = (
+        TrialSet.draw(PROBLEMS["right"].replace(goal={"sequence": n}), 20, 0) for n in (1, 3)
+    )
+    np.testing.assert_array_equal(one.goals, three.goals)
+    for name in ("oracle", "ars-tuned-both-seed0"):
+        (contestant,) = find_contestants(name)
+        expected, found = (measure_holding(contestant, trials) for trials in (one, three))
+        np.testing.assert_array_equal(found.farthest_at_end, expected.farthest_at_end)
+
+
+def test_a_function_that_remembers_has_the_figures_that_it_has_otherwise(trials):
+    def drawing():
+        rng = np.random.default_rng(0)
+        return Contestant.from_function("draws", lambda seen: rng.uniform(-1, 1, (len(seen), 5)))
+
+    held, plain = (run_trials(drawing(), trials, hold=hold) for hold in (True, False))
+    np.testing.assert_array_equal(held.rollouts.distance, plain.rollouts.distance)
 
 
 def test_what_is_exactly_there_goes_on_as_well(trials):
