@@ -1,6 +1,7 @@
 """The table of an evaluation, for terminals, Markdown and reports."""
 
 from collections.abc import Callable, Collection, Mapping, Sequence
+from dataclasses import replace
 from itertools import chain
 from operator import attrgetter
 from typing import TYPE_CHECKING, NamedTuple, TypeVar
@@ -68,9 +69,9 @@ def difference_columns(
         return row.policy if alone else f"{row.policy} less {row.reference}"
 
     figures: list[Column[Difference]] = [
-        Column(each.heading, cell, name, each.meaning, each.priority)
+        replace(metric_column(name, attrgetter("metrics")), cell=cell)
         for name, each in METRICS.items()
-        if each.heading and (name in names if names else each.shows_interval)
+        if (name in names if names else each.shows_interval)
         for cell in [lambda row, name=name: difference_cell(name, row.metrics[name])]
     ]
     return [
@@ -148,10 +149,11 @@ def print_table(
     groups = [table_rows(document, problem) for problem in document.protocol.problems]
     labels = (column for column in all_columns() if column.is_label)
     show(columns or [*labels, *telling_columns([*chain(*groups)])], groups)
-    if differences := document.differences:
-        names = METRICS if markdown and not columns else [column.name for column in columns]
+    names = [each.name for each in columns or (metric_columns() if markdown else ())]
+    compared = difference_columns(document.differences, names)
+    if not all(column.is_label for column in compared):
         console.print()
-        show(difference_columns(differences, names), [differences])
+        show(compared, [document.differences])
 
 
 def table_rows(document: EvaluationDocument, problem: str) -> list[Row]:

@@ -114,3 +114,8 @@ def test_the_first_that_is_named_is_the_reference(evaluated, run, policy_folder,
         assert "less zero" in table
         assert f"{100 * expected.value:+.1f} (" in table
     assert "less zero" in run("kinarm-eval", *asked, "--trials", 9, "--markdown").out
+    chosen = run("kinarm-eval", *asked, "--trials", 9, "--columns", "iqm_distance,mean_steps").out
+    (heading,) = (line for line in chosen.splitlines() if "less zero" in line)
+    assert heading.split()[-3:] == ["iqm", "distance", "m"]
+    for columns in ("mean_steps", "success_range"):
+        assert "less" not in run("kinarm-eval", *asked, "--trials", 9, "--columns", columns).out
