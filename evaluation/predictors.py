@@ -7,11 +7,13 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from gymnasium.spaces import Box
+from gymnasium.spaces import Box, Dict
 from numpy.typing import ArrayLike, NDArray
 
 from kinarm._parallel import one_torch_thread
 from kinarm.envs import ReachEnv
+from kinarm.envs.environment import Interface
+from kinarm.envs.goal import GoalInterface
 from kinarm.episodes import RUNNING, Episodes, Rollouts
 from kinarm.evaluation.trials import TrialSet
 from kinarm.kernels.compiling import Array
@@ -85,14 +87,15 @@ class Actor:
 
 
 def run_remembering(actor: Actor, trials: TrialSet, *, record: bool = False) -> Rollouts:
-    """Run trials with one memory for all of them."""
-    n = len(trials)
+    """Run trials with one memory for all of them, and goals apart where a policy sees them so."""
+    n, space = len(trials), getattr(actor.policy, "observation_space", None)
+    shown = (GoalInterface if isinstance(space, Dict) else Interface)(trials.simulator)
     seen, memory, start = np.zeros((n, trials.simulator.n_observations)), None, np.ones(n, bool)
 
     def actions(observations: Array, rows: NDArray[np.int64]) -> Array:
         nonlocal memory, start
         seen[rows] = observations
-        chosen, memory = actor(seen, memory, start)
+        chosen, memory = actor(shown.observe(seen), memory, start)
         start = np.zeros(n, bool)
         return np.asarray(chosen)[rows]
 

@@ -9,7 +9,7 @@ from kinarm.episodes import SUCCESS
 from kinarm.errors import InvalidInputError
 from kinarm.evaluation import EvaluationRequest, TrialSet, evaluate, find_contestants
 from kinarm.evaluation.selection import select_pairs
-from kinarm.policies import load_policy
+from kinarm.policies import Policy, load_policy
 from kinarm.problem import PROBLEMS
 
 TRIALS, SEED = 12, 3
@@ -108,6 +108,16 @@ class TestStatistics:
         evaluation = evaluate(model, "right", TRIALS, SEED)
         assert ends_of(evaluation) == expected
         assert "observations normalised by VecNormalize" in evaluation.contestant.note
+
+
+def test_a_model_of_a_goal_environment_sees_goals_apart():
+    sb3 = pytest.importorskip("stable_baselines3")
+    env = gymnasium.make("kinarm/ReachGoalRight-v0")
+    model = louder(sb3.PPO("MultiInputPolicy", env, n_steps=64, seed=2, device="cpu"))
+    expected = evaluate(Policy.from_sb3(model), "right", TRIALS, SEED).rollouts
+    found = evaluate(model, "right", TRIALS, SEED).rollouts
+    np.testing.assert_array_equal(found.steps, expected.steps)
+    np.testing.assert_allclose(found.distance, expected.distance, rtol=0, atol=1e-4)
 
 
 class Numbered:
