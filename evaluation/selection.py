@@ -156,7 +156,7 @@ def group_names(contestants: Iterable[Contestant]) -> dict[str, str]:
     """
     alike: dict[Hashable, list[Contestant]] = {}
     for contestant in {each.name: each for each in contestants}.values():
-        alike.setdefault(_training(contestant), []).append(contestant)
+        alike.setdefault(training_of(contestant), []).append(contestant)
     groups = [group for members in alike.values() for group in _with_distinct_seeds(members)]
     names = [_shared_name(group) for group in groups]
     several = Counter(names)
@@ -169,7 +169,7 @@ def group_names(contestants: Iterable[Contestant]) -> dict[str, str]:
     return found
 
 
-def _training(contestant: Contestant) -> Hashable:
+def training_of(contestant: Contestant) -> Hashable:
     """A key that all seeds of a recipe share, or the name."""
     if contestant.policy is None or contestant.seed is None:
         return contestant.name

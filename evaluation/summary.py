@@ -1,6 +1,6 @@
 """Sum up evaluations: pooled training seeds, differences, and the document of all."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Hashable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -20,7 +20,7 @@ from kinarm.evaluation.document import (
 from kinarm.evaluation.estimates import estimate_metrics
 from kinarm.evaluation.evaluation import Evaluation, common_figures, outcomes_of
 from kinarm.evaluation.finding import is_called
-from kinarm.evaluation.selection import check_names, group_names
+from kinarm.evaluation.selection import check_names, group_names, training_of
 from kinarm.evaluation.statistics import Estimate
 from kinarm.policies.provenance import package_versions, source_commit
 from kinarm.problem import ReachProblem
@@ -95,12 +95,12 @@ def pool(evaluations: Sequence[Evaluation]) -> tuple[PooledEvaluation, ...]:
     Groups are those of ``kinarm.evaluation.selection.group_names``.
     """
     names = group_names(evaluation.contestant for evaluation in evaluations)
-    groups: dict[tuple[str, ...], list[Evaluation]] = {}
+    groups: dict[Hashable, list[Evaluation]] = {}
     for each in evaluations:
-        key = (names[each.name], each.problem.digest, each.trials.digest)
-        groups.setdefault(key, []).append(each)
-    several = ((name, members) for (name, *_), members in groups.items() if len(members) > 1)
-    return tuple(PooledEvaluation(name, tuple(members)) for name, members in several)
+        training = names[each.name], training_of(each.contestant)
+        groups.setdefault((*training, each.problem.digest, each.trials.digest), []).append(each)
+    several = (members for members in groups.values() if len(members) > 1)
+    return tuple(PooledEvaluation(names[each[0].name], tuple(each)) for each in several)
 
 
 def _differences(rows: Sequence[Faced], reference: str) -> Iterator[Difference]:

@@ -104,6 +104,16 @@ def test_pooling_keeps_problems_apart(skilled):
     ]
 
 
+def test_pooling_keeps_other_settings_apart(skilled):
+    """Policies that are objects are called alike, whatever their settings."""
+    seeds = [reseeded(skilled, seed) for seed in (0, 1)]
+    settings = {**skilled.provenance.config, "step_size": 9.0}
+    other = replace(skilled, provenance=replace(skilled.provenance, config=settings, seed=2))
+    made = [evaluate(each, trials=2) for each in (*seeds, other)]
+    assert len({each.name for each in made}) == 1
+    assert [group.members for group in pool(made)] == [tuple(made[:2])]
+
+
 def test_pooling_keeps_other_trials_apart(evaluations):
     first, *_ = pool(evaluations)[0].members
     others = [replace(each, trials=each.trials.first(50)) for each in evaluations]
