@@ -16,7 +16,7 @@ from kinarm.evaluation.bounds import oracle_bounds
 from kinarm.evaluation.outcomes import Holding
 from kinarm.evaluation.predictors import Actor, Wrapper, run_remembering, run_wrapped
 from kinarm.evaluation.trials import TrialSet, trial_generator
-from kinarm.networks import Layer, Networks, PolicyFunction
+from kinarm.networks import PolicyFunction
 from kinarm.observation_layout import ObservationLayout, observation_layout
 from kinarm.plant import Plant
 from kinarm.policies.library import group_of
@@ -218,11 +218,8 @@ class Contestant:
     @classmethod
     def from_actor(cls, name: str, actor: Actor, **about: Any) -> "Contestant":
         """Enter what chooses actions in Python; ``about`` are further attributes."""
-        if actor.remembers:
-            run = partial(run_remembering, actor)
-        else:
-            plain = actor.statistics is None and not hasattr(actor.policy, "predict")
-            run = partial(_run, actor.policy if plain else actor.actions)
+        plain = actor.statistics is None and not hasattr(actor.policy, "predict")
+        run = partial(_run, actor.policy) if plain else partial(run_remembering, actor)
         return cls(name, run, **{"recipe": "", "actor": actor, **about})
 
     def in_wrapper(self, wrapper: Wrapper, name: str) -> "Contestant":
@@ -239,9 +236,8 @@ def _run(actor: Policy | PolicyFunction, trials: TrialSet, *, record: bool = Fal
 
 
 def _run_zero(trials: TrialSet, *, record: bool = False) -> Rollouts:
-    still = np.zeros((1, trials.simulator.n_actions, trials.simulator.n_observations))
-    network = Networks((Layer(still, np.zeros(still.shape[:2])),))
-    return trials.simulator.rollout(network, trials.starts, trials.goals, record=record)
+    still = np.zeros((len(trials), trials.simulator.task.horizon, trials.simulator.n_actions))
+    return trials.simulator.rollout_actions(still, trials.starts, trials.goals, record=record)
 
 
 def _run_random(trials: TrialSet, *, record: bool = False) -> Rollouts:

@@ -46,15 +46,6 @@ class Actor:
         known = inspect.signature(predict).parameters if predict else ()
         return {"state", "episode_start", "deterministic"} & {*known}
 
-    @property
-    def remembers(self) -> bool:
-        """Whether it takes and returns a memory, as models of Stable-Baselines3 do."""
-        return "state" in self._options and not isinstance(self.policy, Policy)
-
-    def actions(self, observations: Array) -> ArrayLike:
-        """Choose actions, shape (n, n_actions), without a memory."""
-        return self(observations, None, np.ones(len(observations), bool))[0]
-
     def __call__(
         self,
         observations: Any,

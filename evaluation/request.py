@@ -210,11 +210,9 @@ class EvaluationRequest(ProblemOptions, TableOptions):
 
             self.chosen(all_columns())
         pairs = select_pairs(self)
-        problems = {problem.name: problem for _, problem in pairs}
-        arms = {name: problem.load_arm() for name, problem in problems.items()}
+        arms = {problem: problem.load_arm() for problem in {faced for _, faced in pairs}}
         for contestant, problem in pairs:
-            arm = arms[problem.name]
-            contestant.check(problem, arm, allow_other_arm=self.allow_other_arm)
+            contestant.check(problem, arms[problem], allow_other_arm=self.allow_other_arm)
         for path in self.files:
             check_output(path, overwrite=self.overwrite)
         return pairs
