@@ -199,6 +199,8 @@ class Contestant:
             source,
             actor=Actor(bare),
         )
+        if policy.shield and SHIELDED in name:  # as its file is called
+            return replace(entered, has_shield=True)
         return entered.shielded() if policy.shield else entered
 
     @classmethod

@@ -65,6 +65,14 @@ def test_what_is_first_is_the_reference_with_its_shield_too(policy, tmp_path, mo
     assert compared == {first.replace(".npz", "")}
 
 
+def test_a_file_may_be_called_as_policies_behind_a_shield_are(policy, tmp_path):
+    policy.shielded().save(tmp_path / "mine+shield.npz")
+    names = (str(tmp_path / "mine+shield.npz"),)
+    pairs = select_pairs(EvaluationRequest(policies=names, oracle=False))
+    found = [(contestant.name, contestant.has_shield) for contestant, _ in pairs]
+    assert sorted(set(found)) == [("mine", False), ("mine+shield", True)]
+
+
 def test_baselines_are_behind_a_shield_if_they_are_named_so():
     safe, bare = (evaluate(each, "both", trials=200) for each in ("random+shield", "random"))
     assert (safe.name, safe.rollouts.collision.any()) == ("random+shield", False)
