@@ -26,12 +26,14 @@ NUMBERS_AT_ONCE = 400_000
 """Trial numbers that are resampled at once, which limits the memory."""
 
 
-def estimate_metrics(outcomes: Outcomes, less: Outcomes | None = None) -> dict[str, Estimate]:
+def estimate_metrics(
+    outcomes: Outcomes, less: Outcomes | None = None, *, paired: bool = False
+) -> dict[str, Estimate]:
     """Compute all `METRICS` with intervals; unknown figures stay empty.
 
     Outcomes are of one policy, or of the seeds of a recipe; the figures of others in the same
     trials, ``less``, are subtracted. Intervals are about other trials, and with several training
-    seeds also about other trainings.
+    seeds also about other trainings. ``paired`` seeds of both sides are of the same trainings.
     """
     sides = (outcomes,) if less is None else (outcomes, less)
     known = {
@@ -39,7 +41,7 @@ def estimate_metrics(outcomes: Outcomes, less: Outcomes | None = None) -> dict[s
         for name, metric in METRICS.items()
         if all(side.holding for side in sides) or not metric.needs_holding
     }
-    intervals = _bootstrapped(sides, known) | _of_means(sides, known)
+    intervals = _bootstrapped(sides, known, paired) | _of_means(sides, known, paired)
     estimates = dict.fromkeys(METRICS, Estimate(None))
     for name, metric in known.items():
         values = [metric.formula(side) for side in sides]
@@ -56,13 +58,17 @@ def _less(values: Sequence[Any]) -> Any:
     return values[0] if len(values) == 1 else values[0] - values[1]
 
 
-def _trials(sides: Sequence[Outcomes]) -> int:
-    return len(sides[0].rollouts[0].success)
+def _paired(first: NDArray[np.float64], second: NDArray[np.float64]) -> list[NDArray[np.float64]]:
+    """Both without what seeds of the second differ in, which is common to the same trainings."""
+    common = second - second.mean(axis=0)
+    return [first - common, second - common]
 
 
-def _of_means(sides: Sequence[Outcomes], known: Mapping[str, Metric]) -> dict[str, Interval | None]:
+def _of_means(
+    sides: Sequence[Outcomes], known: Mapping[str, Metric], paired: bool
+) -> dict[str, Interval | None]:
     """Intervals of the metrics that are means over trials."""
-    each = np.arange(_trials(sides))[:, None]
+    each = np.arange(len(sides[0].rollouts[0].success))[:, None]
     alone = [
         [side.of_seed(seed).resampled(each) for seed in range(len(side.rollouts))] for side in sides
     ]
@@ -70,6 +76,8 @@ def _of_means(sides: Sequence[Outcomes], known: Mapping[str, Metric]) -> dict[st
     for name, metric in known.items():
         if metric.interval in ("mid-P", "Student"):
             values = [np.array([metric.formula(seed) for seed in seeds]) for seeds in alone]
+            if paired:
+                values = _paired(*values)
             if metric.interval == "Student":
                 intervals[name] = mean_interval(*values)
             else:
@@ -79,7 +87,7 @@ def _of_means(sides: Sequence[Outcomes], known: Mapping[str, Metric]) -> dict[st
 
 
 def _bootstrapped(
-    sides: Sequence[Outcomes], known: Mapping[str, Metric]
+    sides: Sequence[Outcomes], known: Mapping[str, Metric], paired: bool
 ) -> dict[str, Interval | None]:
     """Intervals of other metrics, from resamples of the trials.
 
@@ -91,7 +99,7 @@ def _bootstrapped(
     def figures(some: Outcomes) -> NDArray[np.float64]:
         return np.stack([formula(some) for formula in formulas.values()])
 
-    trials = _trials(sides)
+    trials = len(sides[0].rollouts[0].success)
     if trials == 1:
         return dict.fromkeys(formulas)
     found = np.concatenate(
@@ -109,6 +117,8 @@ def _bootstrapped(
     if not of_seeds:
         return dict(zip(formulas, map(percentile_interval, found), strict=True))
     of_trials = student(trials) ** 2 * found.var(axis=-1, ddof=1)
+    if paired:
+        of_seeds = _paired(*of_seeds)
     reaches = np.sqrt(squared_reach(*of_seeds) + of_trials)
     middles = _less([figures(side) for side in sides])
     ends = np.stack([middles - reaches, middles + reaches], axis=-1).tolist()

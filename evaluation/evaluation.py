@@ -82,7 +82,7 @@ class Evaluation:
         """Figures of merit less those of another, by their name in `kinarm.evaluation.METRICS`.
 
         Intervals are about other trials, which both would face, and where training seeds are pooled
-        also about other trainings.
+        also about other trainings, or about the same ones, as with and without a shield.
 
         Parameters
         ----------
@@ -99,7 +99,10 @@ class Evaluation:
             raise InvalidInputError(
                 f"differences need the same trials, but in the second, {different}"
             )
-        return estimate_metrics(outcomes_of(self.members), outcomes_of(other.members))
+        sides = self.members, other.members
+        trained, again = ([each.contestant.source for each in side] for side in sides)
+        paired = len(trained) > 1 and trained == again and None not in trained
+        return estimate_metrics(*map(outcomes_of, sides), paired=paired)
 
     @property
     def result(self) -> Result:
@@ -129,9 +132,8 @@ class Evaluation:
         )
 
     def __repr__(self) -> str:
-        name, problem = self.name, self.problem.name
-        trials = f"{len(self.trials)} trials of {problem}"
-        return f"Evaluation({name} on {trials}, success {self.success})"
+        on = f"{self.name} on {len(self.trials)} trials of {self.problem.name}"
+        return f"Evaluation({on}, success {self.success})"
 
 
 def outcomes_of(members: Sequence[Evaluation]) -> Outcomes:

@@ -69,7 +69,12 @@ def find_contestants(
     elif IMPORT_PATH.fullmatch(text):
         found = (_entered(text, _imported(text, "policy")),)
     else:
-        found = _policy_contestants(name_or_file)
+        try:
+            files = [(file.stem, Policy.load(file), file.resolve()) for file in policy_files(text)]
+        except UnknownNameError as error:
+            available = (*UNTRAINED, *error.available, "path/to/model.zip", "module:function")
+            raise UnknownNameError(error.kind, error.given, available) from None
+        found = tuple(Contestant.from_policy(*each) for each in files)
     return found if wrapper is None else tuple(_in_wrapper(each, wrapper) for each in found)
 
 
@@ -105,18 +110,6 @@ def _name_of(function: Any) -> str:
         made = function.provenance
         return f"{made.algorithm}-{made.recipe}-{function.problem.name}"
     return getattr(function, "__name__", None) or type(function).__name__
-
-
-def _policy_contestants(name_or_file: str | Path) -> tuple[Contestant, ...]:
-    """Policies of a name, file or folder."""
-    try:
-        paths = policy_files(name_or_file)
-    except UnknownNameError as error:
-        available = (*UNTRAINED, *error.available, "path/to/model.zip", "module:function")
-        raise UnknownNameError(error.kind, error.given, available) from None
-    return tuple(
-        Contestant.from_policy(path.stem, Policy.load(path), path.resolve()) for path in paths
-    )
 
 
 def check_normalizing(contestants: Iterable[Contestant], vec_normalize: str | Path | None) -> None:

@@ -42,8 +42,7 @@ class Actor:
     @cached_property
     def _options(self) -> set[str]:
         """Which of its arguments ``predict`` takes."""
-        predict = getattr(self.policy, "predict", None)
-        known = inspect.signature(predict).parameters if predict else ()
+        known = inspect.signature(self.policy.predict).parameters
         return {"state", "episode_start", "deterministic"} & {*known}
 
     def __call__(

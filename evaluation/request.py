@@ -151,9 +151,7 @@ class EvaluationRequest(ProblemOptions, TableOptions):
                 locks.enter_context(only_writer(folder))
             evaluations = self._face(pairs, tell)
             document = evaluation_document(
-                evaluations,
-                repr(self) if command is None else command,
-                next(iter(self.policies), ""),
+                evaluations, command or repr(self), next(iter(self.policies), "")
             )
             if self.out is not None:
                 write_text(self.out / DOCUMENT, json.dumps(document.to_json(), indent=1) + "\n")

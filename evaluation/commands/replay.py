@@ -167,7 +167,13 @@ class ReplayRequest(ProblemOptions):
         out = self.out or Path(usual)
         own = self.out is None and out.is_file() and GENERATOR in out.read_bytes()[:2000]
         check_output(out, overwrite=self.overwrite or own)
-        page = self._replay(report) if self.play is None else self._playground()
+        if self.play is None:
+            page = self._replay(report)
+        else:
+            from kinarm.evaluation.replay.playground import playground
+
+            with open_console(stderr=True).status("making the page"):
+                page = playground(self)
         page.save(out)
         report(f"written: {out}, {len(page.html) / 1e6:.1f} MB, {acts} offline in any browser")
         return page
@@ -183,12 +189,6 @@ class ReplayRequest(ProblemOptions):
         from kinarm.evaluation.replay.recordings import chosen_recordings
 
         return chosen_recordings(self).runs
-
-    def _playground(self) -> "HtmlPage":
-        from kinarm.evaluation.replay.playground import playground
-
-        with open_console(stderr=True).status("making the page"):
-            return playground(self)
 
     def _replay(self, report: Callable[[str], object]) -> "HtmlPage":
         from kinarm.evaluation.replay.recordings import chosen_recordings

@@ -1,15 +1,17 @@
 """Policies less another in the same trials: figures, intervals, and trials that differ."""
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from kinarm.errors import InvalidInputError
 from kinarm.evaluation import EvaluationRequest
-from kinarm.evaluation.evaluation import evaluate
+from kinarm.evaluation.estimates import estimate_metrics
+from kinarm.evaluation.evaluation import evaluate, outcomes_of, run_trials
 from kinarm.evaluation.metrics import METRICS
-from kinarm.evaluation.statistics import share_difference
+from kinarm.evaluation.statistics import contrast, share_difference
 from kinarm.evaluation.summary import evaluation_document, pool
 from kinarm.policies import ARSConfig, train_policy
 from kinarm.problem import PROBLEMS
@@ -40,6 +42,29 @@ def test_recipes_are_compared_over_seeds_and_trials(evaluations):
     assert found["success"] == share_difference(hits, one.rollouts.success[None])
     alone = group.members[1].difference(one)
     assert np.diff(found["mean_distance"].ci95) > np.diff(alone["mean_distance"].ci95)
+
+
+def test_the_same_trainings_are_compared_one_by_one(evaluations):
+    """What seeds differ in is common to both, as with and without a shield."""
+    (group,) = pool(evaluations)
+    members = [replace(each.contestant, source=Path(each.name)) for each in group.members]
+    safe = [each.shielded() for each in members]
+    sides = [
+        pool([run_trials(each, evaluations[0].trials) for each in side])[0]
+        for side in (safe, members)
+    ]
+    found, hits = sides[0].difference(sides[1]), [each.rollouts.success for each in group.members]
+    kept = [each.rollouts.success for each in sides[0].members]
+    paired = contrast([(1.0, np.subtract(kept, hits, dtype=float))]).ci95
+    low, high = found["success"].ci95
+    assert low <= paired[0] <= paired[1] <= high
+    apart = share_difference(np.array(kept), np.array(hits)).ci95
+    assert high - low < 0.5 * (apart[1] - apart[0])
+    other = estimate_metrics(*(outcomes_of(side.members) for side in sides))
+    assert other["success"].ci95 == apart
+    for name in ("mean_distance", "median_distance"):
+        assert found[name].value == other[name].value
+        assert np.diff(found[name].ci95) < np.diff(other[name].ci95)
 
 
 @pytest.mark.parametrize(
