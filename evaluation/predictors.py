@@ -101,7 +101,7 @@ def run_wrapped(
     run = _in_batch if parameters[:1] == ["venv"] else _one_by_one
     simulator = trials.simulator
     if isinstance(actor.policy, Policy):
-        trials = replace(trials, simulator=simulator.seen_as(actor.policy.observation))
+        trials = replace(trials, simulator=simulator.changed(observation=actor.policy.observation))
     actions = np.zeros((len(trials), simulator.task.horizon, simulator.n_actions))
     run(actor, wrapper, trials, actions)
     return simulator.rollout_actions(actions, trials.starts, trials.goals, record=record)

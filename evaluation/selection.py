@@ -15,6 +15,7 @@ from kinarm.evaluation.finding import check_normalizing, find_contestants
 from kinarm.observation_choice import Observation
 from kinarm.policies.library import group_of, is_shipped, policy_names
 from kinarm.problem import PROBLEMS, ReachProblem
+from kinarm.problem_files import problem_names
 
 if TYPE_CHECKING:
     from kinarm.evaluation.request import EvaluationRequest
@@ -74,16 +75,25 @@ def _changed(request: "EvaluationRequest", problem: ReachProblem) -> ReachProble
 
 
 def _shipped(request: "EvaluationRequest", named: list[ReachProblem]) -> list[Contestant]:
-    """Shipped policies for the arm, of the paper's tasks unless others are named; and baselines."""
-    found = [find_contestants(name, wrapper=request.wrapper) for name in policy_names()]
-    trained = {each: each.problem for shipped in found for each in shipped}
-    fitting = {
-        own
-        for own in {*trained.values()}
-        if own and (named or own.name in PROBLEMS)
-        if _changed(request, own).arm_digest == own.arm_digest
-    }
-    return [*(each for each, own in trained.items() if own in fitting), *BASELINES.values()]
+    """Shipped policies for the arm and the named problems; then the baselines.
+
+    Names say what policies were trained for: others are not opened.
+    """
+    others = {each.name for each in named}.intersection(problem_names())
+    known = PROBLEMS | {name: ReachProblem.load(name) for name in others}
+    serving = tuple(
+        f"-{name}"
+        for name, problem in known.items()
+        if (changed := _changed(request, problem)).arm_digest == problem.arm_digest
+        and (not named or any(changed.faced_as(each).covers(each) for each in named))
+    )
+    shipped = [
+        contestant
+        for name in policy_names()
+        if group_of(name).endswith(serving)
+        for contestant in find_contestants(name, wrapper=request.wrapper)
+    ]
+    return [*shipped, *BASELINES.values()]
 
 
 def _named_contestants(request: "EvaluationRequest", named: list[ReachProblem]) -> list[Contestant]:

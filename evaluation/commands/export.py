@@ -53,14 +53,8 @@ def _export(request: ExportRequest, _: str) -> None:
         raise InvalidInputError("--problem and --vec-normalize are for a model (.zip)")
     else:
         policy = load_policy(request.policy)
-    export_policy(
-        policy,
-        request.out,
-        overwrite=request.overwrite,
-        onnx=request.onnx,
-        sign=request.sign or None,
-        offset=request.offset or None,
-    )
+    wiring = {"sign": request.sign or None, "offset": request.offset or None}
+    export_policy(policy, request.out, overwrite=request.overwrite, onnx=request.onnx, **wiring)
     print(f"written: {request.out}; python {request.out}/self_test.py tests it")
 
 

@@ -55,8 +55,7 @@ class SOArm(Backend):
         """Connect to the bus; the arm must be calibrated, and is held where it is."""
         self._robot.connect(calibrate=False)
         if not self._robot.is_calibrated:
-            asked = f"run lerobot-calibrate with --robot.id={self._name}"
-            raise ConnectionError(f"it is not calibrated: {asked}")
+            raise ConnectionError(f"run lerobot-calibrate with --robot.id={self._name}")
         if not self._degrees:
             for joint, name in enumerate(self.joint_names):
                 known = self._robot.calibration[name]
