@@ -34,7 +34,8 @@ def compare() -> Iterator[Compared]:
     problem = PROBLEMS["right"].replace(arm="ur5", scene=Scene(ground=False))
     world, surroundings = World(problem, threads=1), vamp.Environment()
     for box in PAPER_BENCHES:
-        surroundings.add_cuboid(vamp.Cuboid(list(box.centre), [0.0] * 3, list(box.size / 2)))
+        centre, half = np.add(box.upper, box.lower) / 2, np.subtract(box.upper, box.lower) / 2
+        surroundings.add_cuboid(vamp.Cuboid(centre.tolist(), [0.0] * 3, half.tolist()))
     waypoints = free_walk(world, surroundings, np.random.default_rng(0))
     path = vamp.ur5.Path()
     for waypoint in waypoints:
