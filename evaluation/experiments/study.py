@@ -234,7 +234,7 @@ class Study:
 
     @cached_property
     def bounds(self) -> Mapping[str, OracleSolutions]:
-        """Bounds of the trials of finished trainings, by the `faced` of their problem."""
+        """Bounds of the trials of finished trainings, by the hash of the problem that is faced."""
         trials, wanted = self.experiment.trials, self.finished if self.experiment.bounds else ()
         problems = {faced(run.config.problem): run.config.problem for run in wanted}
         return {
