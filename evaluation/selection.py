@@ -12,7 +12,6 @@ from typing import TYPE_CHECKING
 from kinarm.errors import InvalidInputError
 from kinarm.evaluation.contestants import BASELINES, ORACLE, UNTRAINED, Contestant
 from kinarm.evaluation.finding import check_normalizing, find_contestants
-from kinarm.observation_choice import Observation
 from kinarm.policies.library import group_of, is_shipped, policy_names
 from kinarm.problem import PROBLEMS, ReachProblem
 from kinarm.problem_files import problem_names
@@ -113,7 +112,7 @@ def _problems(request: "EvaluationRequest", chosen: list[Contestant]) -> list[Re
     """
     own: dict[str, ReachProblem] = {}
     for problem in (_changed(request, each.problem) for each in chosen if each.problem):
-        own.setdefault(problem.replace(observation=Observation()).digest, problem)
+        own.setdefault(problem.unseen.digest, problem)
     changed = (_changed(request, problem) for problem in PROBLEMS.values())
     shipped = {problem.digest: problem for problem in changed}
     if request.matrix or not own:

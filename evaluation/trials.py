@@ -9,7 +9,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kinarm.errors import MOST_TRIALS, whole_number
-from kinarm.observation_choice import Observation
 from kinarm.problem import ProblemLike, ReachProblem
 from kinarm.scenarios import draw_for_each
 from kinarm.simulator import Simulator
@@ -96,7 +95,7 @@ class TrialSet:
     @property
     def rules(self) -> ReachProblem:
         """The problem without its reward and observation, by which trials do not differ."""
-        return self.problem.replace(reward=RewardWeights(), observation=Observation())
+        return self.problem.unseen.replace(reward=RewardWeights())
 
     @cached_property
     def digest(self) -> str:

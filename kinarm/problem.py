@@ -194,6 +194,11 @@ class ReachProblem(Checked):
         text = json.dumps(entries, sort_keys=True)
         return hashlib.sha256(text.encode()).hexdigest()[:16]
 
+    @cached_property
+    def unseen(self) -> "ReachProblem":
+        """The same problem with the standard observation: what is seen changes no trial."""
+        return self.replace(observation=Observation())
+
     @property
     def changes(self) -> list[str]:
         """Settings of task, stepping and plant other than the shipped problem's of that name.

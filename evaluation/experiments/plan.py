@@ -4,7 +4,7 @@ import hashlib
 import json
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property, lru_cache
+from functools import cached_property
 from itertools import product
 from typing import Any
 
@@ -13,7 +13,6 @@ from kinarm._fields import from_plain, init_fields, to_plain
 from kinarm.errors import InvalidInputError, KinarmError, UnknownNameError
 from kinarm.evaluation.experiments.curve import TrialSettings
 from kinarm.evaluation.experiments.experiment import MOST_TRAININGS, Entry, Experiment
-from kinarm.observation_choice import Observation
 from kinarm.policies.config import TrainingConfig, merged
 from kinarm.policies.learners import Learner, find_learner
 from kinarm.policies.recipes import recipe
@@ -68,12 +67,6 @@ class Run:
         made = f"{self.learner} {config.recipe} {config.problem.name} seed {config.seed}"
         chosen = ", ".join(f"{key} {value}" for key, value in self.choices.items())
         return f"{made}, {chosen}" if chosen else made
-
-
-@lru_cache(maxsize=1024)
-def faced(problem: ReachProblem) -> str:
-    """Hash of a problem but for what is seen of it, by which its trials do not differ."""
-    return problem.replace(observation=Observation()).digest
 
 
 def hash_of(entries: Any) -> str:

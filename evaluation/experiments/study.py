@@ -18,7 +18,7 @@ from kinarm.errors import InvalidInputError, TrainingFailedError, whole_number
 from kinarm.evaluation.bounds import oracle_bounds
 from kinarm.evaluation.experiments.executors import Executor, Failure, LocalExecutor
 from kinarm.evaluation.experiments.experiment import Experiment
-from kinarm.evaluation.experiments.plan import Run, faced, plan
+from kinarm.evaluation.experiments.plan import Run, plan
 from kinarm.evaluation.experiments.runs import Task, TaskResult, TrainedRun, load_policy, train
 from kinarm.evaluation.experiments.search import carry_out_search, searched_runs
 from kinarm.evaluation.experiments.store import SPECIFICATION, Store
@@ -234,9 +234,9 @@ class Study:
 
     @cached_property
     def bounds(self) -> Mapping[str, OracleSolutions]:
-        """Bounds of the trials of finished trainings, by the hash of the problem that is faced."""
+        """Bounds of finished trainings, by the hash of their problem but for what is seen."""
         trials, wanted = self.experiment.trials, self.finished if self.experiment.bounds else ()
-        problems = {faced(run.config.problem): run.config.problem for run in wanted}
+        problems = {run.config.problem.unseen.digest: run.config.problem for run in wanted}
         return {
             digest: oracle_bounds(trial_set(problem, trials.count, trials.seed))
             for digest, problem in problems.items()
@@ -273,7 +273,7 @@ class Study:
             shared.setdefault((run.entry.name, repr((run.learner, config))), []).append(run)
         groups, firsts = list[Group](), dict[str, Group]()
         for runs in shared.values():
-            digest = faced(runs[0].config.problem)
+            digest = runs[0].config.problem.unseen.digest
             group = Group(
                 label=self._label(runs[0]),
                 entry=runs[0].entry,
@@ -317,7 +317,8 @@ class Study:
         rows = []
         for run, trained in self.finished.items():
             clock = trained.clock
-            outcomes = Outcomes((trained.outcomes,), self.bounds.get(faced(run.config.problem)))
+            bounds = self.bounds.get(run.config.problem.unseen.digest)
+            outcomes = Outcomes((trained.outcomes,), bounds)
             rows.append(
                 {
                     **({"entry": run.entry.name} if self.experiment.entries else {}),
