@@ -23,7 +23,6 @@ from kinarm.policies.library import group_of
 from kinarm.policies.policy import Policy
 from kinarm.policies.provenance import normalization_remark
 from kinarm.problem import PROBLEMS, ReachProblem
-from kinarm.simulator import Simulator
 from kinarm.task import NEVER
 
 SHIELDED = "+shield"
@@ -275,8 +274,8 @@ def measure_holding(contestant: Contestant, trials: TrialSet) -> Holding:
     endless = replace(trials, simulator=trials.simulator.changed(tolerance=NEVER))
     if contestant is ORACLE:
         nearer = min(AIM, trials.problem.task.tolerance)
-        aim = trials.problem.replace(tolerance=nearer, goal={"sequence": 1})
-        aimed = replace(trials, simulator=Simulator(aim))
+        aim = trials.simulator.changed(tolerance=nearer, goal={"sequence": 1})
+        aimed = replace(trials, simulator=aim)
         rollouts = _run_oracle(endless, record=True, aimed=aimed)
     else:
         rollouts = contestant.run(endless, record=True)

@@ -58,6 +58,10 @@ def _less(values: Sequence[Any]) -> Any:
     return values[0] if len(values) == 1 else values[0] - values[1]
 
 
+def _trials(sides: Sequence[Outcomes]) -> int:
+    return len(sides[0].rollouts[0].success)
+
+
 def _paired(first: NDArray[np.float64], second: NDArray[np.float64]) -> list[NDArray[np.float64]]:
     """Both without what seeds of the second differ in, which is common to the same trainings."""
     common = second - second.mean(axis=0)
@@ -68,7 +72,7 @@ def _of_means(
     sides: Sequence[Outcomes], known: Mapping[str, Metric], paired: bool
 ) -> dict[str, Interval | None]:
     """Intervals of the metrics that are means over trials."""
-    each = np.arange(len(sides[0].rollouts[0].success))[:, None]
+    each = np.arange(_trials(sides))[:, None]
     alone = [
         [side.of_seed(seed).resampled(each) for seed in range(len(side.rollouts))] for side in sides
     ]
@@ -99,7 +103,7 @@ def _bootstrapped(
     def figures(some: Outcomes) -> NDArray[np.float64]:
         return np.stack([formula(some) for formula in formulas.values()])
 
-    trials = len(sides[0].rollouts[0].success)
+    trials = _trials(sides)
     if trials == 1:
         return dict.fromkeys(formulas)
     found = np.concatenate(
