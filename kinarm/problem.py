@@ -196,7 +196,7 @@ class ReachProblem(Checked):
 
     @cached_property
     def unseen(self) -> "ReachProblem":
-        """The same problem with the standard observation: what is seen changes no trial."""
+        """The same problem with the standard observation; what is seen changes no trial."""
         return self.replace(observation=Observation())
 
     @property
