@@ -65,13 +65,9 @@ def draw_plants(
     for e in range(first, last):
         plant = plants[e]
         seed_state(state, SEED, bits, e)
-        plant[HIGH_BITS] = float(state[0] >> np.uint64(32))
-        plant[LOW_BITS] = float(state[0] & np.uint64(0xFFFFFFFF))
         for i in range(drawn.shape[0]):
             lower, upper = ranges[i, 0], ranges[i, 1]
             drawn[i] = lower + uniform(state) * (upper - lower)
-            if i == 3:
-                uniform(state)  # once drew another limit: plants are those of recorded figures
         # As likely for each number of steps.
         lower, upper = ranges[0, 0], ranges[0, 1]
         plant[DELAY] = lower + math.floor(uniform(state) * (upper - lower + 1.0))
@@ -86,6 +82,9 @@ def draw_plants(
                 plant[OFFSETS + kind * n_actuated + axis] = offset
         for i in range(3):
             plant[OFFSETS + 2 * n_actuated + i] = drawn[9] * (2.0 * uniform(state) - 1.0)
+        # The numbers that follow are those of the noise.
+        plant[HIGH_BITS] = float(state[0] >> np.uint64(32))
+        plant[LOW_BITS] = float(state[0] & np.uint64(0xFFFFFFFF))
 
 
 @inlined

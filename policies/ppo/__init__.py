@@ -191,6 +191,8 @@ class EpisodeStates(NamedTuple):
     done : ndarray of int, shape (n, 2) or (0, 2)
         Goals reached, and steps in a row that the present one is kept, of goals
         beyond standing points.
+    observation : ndarray, shape (n, n_observations), or empty
+        What they see, where it tells of earlier steps.
     """
 
     q: NDArray[np.float64]
@@ -201,6 +203,7 @@ class EpisodeStates(NamedTuple):
     replayed: NDArray[np.bool_]
     drive: NDArray[np.float64] = np.zeros((0, 0, 0))
     done: NDArray[np.int64] = np.zeros((0, 2), dtype=np.int64)
+    observation: NDArray[np.float64] = np.zeros((0, 0))
 
     @classmethod
     def begun(cls, starts: NDArray[np.float64], goals: NDArray[np.float64]) -> "EpisodeStates":

@@ -79,6 +79,8 @@ class TrainingArms:
         self.episodes = self.simulator.reset(
             *scenarios, origins=start, taken=taken, drive=begun.drive, done=kept
         )
+        if len(begun.observation):
+            self.episodes.observation[:] = begun.observation
         self._total, self._start, self.replayed = begun.total, begun.start, begun.replayed
         self.failed = state.failed
         self.returns: list[NDArray[np.float64]] = []
@@ -91,7 +93,8 @@ class TrainingArms:
         episodes, ours = self.episodes, (self._total, self._start, self.replayed)
         done = np.stack([episodes.pursuit.goals_reached, episodes.pursuit.held], axis=1)
         begun = (episodes.q, episodes.first_goals, episodes.steps)
-        parts = (*begun, *ours, episodes.drive, done)
+        seen = episodes.observation if self.simulator.world.layout.remembers else np.zeros((0, 0))
+        parts = (*begun, *ours, episodes.drive, done, seen)
         return EpisodeStates._make(map(np.copy, parts))
 
     def observe(self) -> Numbers:

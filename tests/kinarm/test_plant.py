@@ -129,6 +129,20 @@ def test_noise_has_its_deviation_and_differs_by_step_joint_and_episode():
     assert abs(np.corrcoef(noise[:-1].ravel(), noise[1:].ravel())[0, 1]) < 0.03
 
 
+def test_noise_tells_nothing_of_the_plant_that_it_comes_from():
+    simulator = simulator_with(**EVERYTHING)
+    starts, goals = simulator.sample(np.random.default_rng(0), 4000)
+    episodes, off = simulator.reset(starts, goals), []
+    for _ in range(4):
+        off.append(np.hstack([episodes.sensed[:, :5], episodes.observation[:, :3]]))
+        simulator.step(episodes, np.zeros((4000, 5)))
+    # With joints at rest, what changes from step to step is noise.
+    changes = np.diff(off, axis=0).transpose(1, 0, 2).reshape(4000, -1)
+    plants = episodes.plant[:, episodes.plant.std(axis=0) > 1e-12]
+    together = np.corrcoef(np.hstack([changes, plants]).T)
+    assert np.abs(together[: changes.shape[1], changes.shape[1] :]).max() < 0.1
+
+
 def test_commanded_positions_are_seen_in_place_of_measured_ones():
     simulator = simulator_with(bandwidth=3.0, noise=0.1, feedback="commanded")
     starts, goals = simulator.sample(np.random.default_rng(0), 20)

@@ -30,13 +30,10 @@ def normalizer():
     return Normalizer.of(simulator.world.observe(*simulator.sample(np.random.default_rng(1), 500)))
 
 
-def made(
-    *, number=NUMBER, horizon=64, tolerance=0.5, scene=None, shield=None, goal=None, **settings
-):
-    """Arms that have not begun."""
-    changes = {"tolerance": tolerance, "horizon": horizon, "scene": scene}
-    changes |= {"shield": shield, "goal": goal}
-    problem = PROBLEMS["both"].replace(reward=REWARD, **changes)
+def made(*, number=NUMBER, horizon=64, tolerance=0.5, changes=None, **settings):
+    """Arms that have not begun, for a changed problem."""
+    always = {"tolerance": tolerance, "horizon": horizon, "reward": REWARD}
+    problem = PROBLEMS["both"].replace(**always, **(changes or {}))
     config = PPOConfig(problem=problem, n_envs=number, n_steps=100, batch_size=20, **settings)
     return TrainingArms(config)
 
@@ -45,12 +42,13 @@ def made(
 def begun(normalizer):
     def begin(seed=0, **settings):
         arms, rng = made(**settings), np.random.default_rng(seed)
-        nothing = np.zeros(0, dtype=np.float32)
+        nothing, size = np.zeros(0, dtype=np.float32), arms.simulator.n_observations
+        same = size == len(normalizer.mean)
         state = PPOState(
             parameters=nothing,
             first_moment=nothing,
             second_moment=nothing,
-            normalizer=normalizer,
+            normalizer=normalizer if same else Normalizer.of(rng.normal(size=(9, size))),
             episodes=EpisodeStates.begun(*arms.sample(rng, arms.config.n_envs)),
             failed=FailedScenarios.none(6),
             scenarios=0,
@@ -86,11 +84,11 @@ def test_random_bodies_stay_where_a_training_goes_on(begun):
     ball = {"name": "ball", "shape": "sphere", "smallest": (0.05,), "largest": (0.1,)}
     there = RandomBodies(lower=(-0.5, -0.5, 0.2), upper=(0.5, 0.5, 0.7), **ball)
     scene = replace(PROBLEMS["both"].scene, random_bodies=(there,))
-    arms, state = begun(number=64, scene=scene)
+    arms, state = begun(number=64, changes={"scene": scene})
     rng = np.random.default_rng(1)
     for _ in range(20):
         arms.step(rng.uniform(-1, 1, (64, 5)).astype(np.float32))
-    again = made(number=64, scene=scene)
+    again = made(number=64, changes={"scene": scene})
     again.restore(go_on(arms, state), rng)
     np.testing.assert_array_equal(again.episodes.scenes, arms.episodes.scenes)
     assert len(np.unique(arms.episodes.scenes[:, 2, 13])) == 64
@@ -148,14 +146,22 @@ def test_equals_single_environments(begun, normalizer, horizon, steps):
     assert (ends["truncated"] if horizon == 3 else ends["success"]) > 2
 
 
-@pytest.mark.parametrize("replay", [{}, {"replay_share": 0.5, "replay_size": 30}])
-def test_restored_episodes_go_on_as_if_nothing_had_happened(begun, replay):
-    arms, state = begun(4, number=40, **replay)
+REMEMBERING = {
+    "plant": "hard",
+    "observation": {"parts": ("goal_minus_tool", "last_action"), "history": 2},
+}
+
+
+@pytest.mark.parametrize(
+    "settings", [{}, {"replay_share": 0.5, "replay_size": 30}, {"changes": REMEMBERING}]
+)
+def test_restored_episodes_go_on_as_if_nothing_had_happened(begun, settings):
+    arms, state = begun(4, number=40, **settings)
     rng = np.random.default_rng(0)
     for _ in range(40):
         arms.step(rng.uniform(-1, 1, (40, 5)))
     state = go_on(arms, state)
-    other, _ = begun(99, number=40, **replay)
+    other, _ = begun(99, number=40, **settings)
     other.restore(state, np.random.default_rng(5))
     np.testing.assert_array_equal(other.observe(), arms.observe())
     arms._rng = np.random.default_rng(5)
@@ -258,7 +264,7 @@ class TestReplay:
 
 
 def test_steps_that_a_shield_replaces_have_a_price(begun):
-    free, dear = (begun(shield=True, intervention_penalty=price)[0] for price in (0.0, 0.5))
+    free, dear = (begun(changes={"shield": True}, intervention_penalty=price)[0] for price in (0.0, 0.5))
     replaced = 0
     for _ in range(20):
         before, actions = dear.episodes.interventions.copy(), np.ones((NUMBER, 5), np.float32)
