@@ -241,8 +241,7 @@ class Policy:
         Parameters
         ----------
         module : nn.Module
-            A ``Sequential`` of ``Linear`` and activation functions, maybe
-            nested.
+            A ``Sequential`` of ``Linear`` and activation functions, or of such.
         problem : ReachProblem, str or Path
             The problem that it is for.
         mean, std : array_like, shape (n_observations,), optional

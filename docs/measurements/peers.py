@@ -218,8 +218,8 @@ def compare_environment(
     gymnasium.register_envs(import_module(module))
     terms = (
         f"random actions through gymnasium.make, one process. {about}, 20 steps of 0.002 s of "
-        "dynamics a step of 0.04 s; kinarm: kinematics, 0.02 s a step, 4 configurations tested "
-        "for contact"
+        "dynamics a step of 0.04 s; kinarm: kinematics, 0.02 s a step, whose whole motion is "
+        "tested for contact"
     )
     theirs = gymnasium.make(name, disable_env_checker=True)
     single = gymnasium.make(

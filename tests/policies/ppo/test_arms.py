@@ -264,7 +264,9 @@ class TestReplay:
 
 
 def test_steps_that_a_shield_replaces_have_a_price(begun):
-    free, dear = (begun(changes={"shield": True}, intervention_penalty=price)[0] for price in (0.0, 0.5))
+    free, dear = (
+        begun(changes={"shield": True}, intervention_penalty=price)[0] for price in (0.0, 0.5)
+    )
     replaced = 0
     for _ in range(20):
         before, actions = dear.episodes.interventions.copy(), np.ones((NUMBER, 5), np.float32)
