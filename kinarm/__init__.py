@@ -6,7 +6,7 @@ import lazy_loader
 
 from kinarm import _interrupts as _interrupts
 
-__version__ = "1.0.0"
+__version__ = "2.0.0"
 
 SEMANTICS = "6"
 """Version of every number that simulator and learners compute from settings and seeds.
