@@ -49,7 +49,7 @@ lint: $(call INSTALLED,dev) ## check style, format and types
 docs: $(call INSTALLED,docs) ## build the site into docs/_build/html
 	$(BIN)/sphinx-build -n -W --keep-going --jobs 4 -b html docs docs/_build/html
 
-PYTHONS ?= python3.11 python3.12 python3.13
+PYTHONS ?= python3.11 python3.12 python3.13 python3.14
 
 package: $(call INSTALLED,package) ## build, check and install what is published, with all PYTHONS
 	$(BIN)/python tests/packaging/everywhere.py $(PYTHONS)

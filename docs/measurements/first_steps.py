@@ -1,9 +1,9 @@
-"""Do what a newcomer does: from a clone to an own policy and its replay, with a log.
+"""Do what a newcomer does: from a clone to an own policy that runs on an arm, with a log.
 
 ``python -m docs.measurements.first_steps data/results/first_steps`` clones what is committed, and
 types the commands of the README and then those of the tutorial *First policy*, as they are written,
 in their order. It records what was typed, how long each command took and what it printed, and opens
-the last replay in a browser. Needs the network, Chromium and the extra ``test``. It fails if a
+the playground in a browser. Needs the network, Chromium and the extra ``test``. It fails if a
 command does, or if the policy reaches less than `ENOUGH`.
 """
 
@@ -40,7 +40,7 @@ class Step(NamedTuple):
     Attributes
     ----------
     typed : str
-        Commands of a shell or of Python.
+        A command.
     seconds : float
         How long it took [s].
     said : str
@@ -51,12 +51,6 @@ class Step(NamedTuple):
     seconds: float
     said: str
 
-    @property
-    def in_one_line(self) -> str:
-        """What was typed, or that it was a program."""
-        lines = self.typed.splitlines()
-        return f"`{lines[0]}`" if len(lines) == 1 else "Python of the tutorial"
-
 
 def typed() -> Iterator[str]:
     """What a newcomer types in the clone, if the README says the first two commands."""
@@ -66,12 +60,8 @@ def typed() -> Iterator[str]:
         raise SystemExit(f"{readme.name} does not say: {', '.join(missing)}")
     yield INSTALL
     for block in blocks(tutorial):
-        if block.told != "run":
-            continue
         if block.language == "sh":
             yield from block.code.splitlines()
-        else:
-            yield f"python - <<'END'\n{block.code}END"
 
 
 def carry_out(command: str, clone: Path, environment: dict[str, str]) -> Step:
@@ -103,7 +93,7 @@ def success(clone: Path, environment: dict[str, str]) -> float:
 
 def table(steps: list[Step], reached: float) -> str:
     """What was typed and how long it took, for the documentation."""
-    rows = [(step.in_one_line, f"{step.seconds:.0f}") for step in steps]
+    rows = [(f"`{step.typed}`", f"{step.seconds:.0f}") for step in steps]
     total = ("**all**", f"{sum(step.seconds for step in steps):.0f}")
     return (
         markdown_table(("typed", "seconds"), [*rows, total])
@@ -129,15 +119,15 @@ def main(out: Path) -> None:
         environment = {
             **{key: value for key, value in os.environ.items() if key != "VIRTUAL_ENV"},
             "KINARM_CACHE": f"{name}/cache",
-            "COLUMNS": "100",
+            "COLUMNS": "80",
         }
         subprocess.run(["git", "clone", "--quiet", ROOT, clone], check=True)
         steps = []
         for command in typed():
             steps.append(carry_out(command, clone, environment))
-            sys.stderr.write(f"{steps[-1].seconds:6.1f} s  {steps[-1].in_one_line}\n")
+            sys.stderr.write(f"{steps[-1].seconds:6.1f} s  {command}\n")
         reached = success(clone, environment)
-        with open_page(clone / "failures.html", 1000, 640) as opened:
+        with open_page(clone / "play.html", 1000, 640) as opened:
             opened.wait_for_selector("body[data-ready]")
             opened.screenshot(path=out.with_suffix(".png"))
     out.with_suffix(".md").write_text(table(steps, reached), encoding="utf-8")

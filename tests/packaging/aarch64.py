@@ -34,7 +34,7 @@ LINUX = [f"manylinux_2_{minor}_aarch64" for minor in (28, 27, 26, 24, 17)] + [
     "manylinux2014_aarch64"
 ]
 MACOS = ["macosx_14_0_arm64"]
-PYTHONS = ("3.11", "3.12", "3.13")
+PYTHONS = ("3.11", "3.12", "3.13", "3.14")
 
 EVALUATE = "kinarm-eval --policy ppo-best-both ars-linear-both --problem both --shield --json"
 COMPUTE = f"""

@@ -1,6 +1,6 @@
 """Build what is committed and use it away from the clone, with several Pythons.
 
-``python tests/packaging/everywhere.py python3.11 python3.12 python3.13`` checks the sdist and the
+``python tests/packaging/everywhere.py python3.11 python3.13 python3.14`` checks the sdist and the
 wheel, installs both with the pinned libraries, and with the first Python also with the oldest
 libraries that ``pyproject.toml`` allows. All of them have to come to the same results, to the bit.
 Needs the network, ``build`` and ``twine``; ``make package`` installs these.
