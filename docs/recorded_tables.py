@@ -270,6 +270,20 @@ def hard_table() -> str:
     return markdown_table(["`hard-paper`", "seeds", "success %", "worst seed %", "contact %"], rows)
 
 
+def undecided_table() -> str:
+    """What the oracle finds of each shipped arm's goals, on benches that it can reach."""
+    record = json.loads((RESULTS / "plans" / "undecided.json").read_text(encoding="utf-8"))
+    rows = []
+    for row in record["rows"]:
+        across, upwards = row["nearer"]
+        benches = "the paper's" if across == 1 else f"{across:g} as far, {upwards:g} as high"
+        shares = (f"{100 * row[each]:.1f}" for each in ("reached", "out of reach", "undecided"))
+        mean, p95 = row["step ratio"]
+        rows.append([f"`{row['arm']}`", benches, *shares, f"{mean:.2f}, {p95:.2f}"])
+    heads = ["motion found %", "proven out of reach %", "undecided %", "step ratio: mean, p95"]
+    return markdown_table(["arm", "benches", *heads], rows)
+
+
 RECORDED = {
     "skills": skills_table,
     "hard": hard_table,
@@ -278,6 +292,7 @@ RECORDED = {
     "failures-to-watch": watching_table,
     "injections": injections_table,
     "plans": plans_table,
+    "undecided": undecided_table,
     "servos": servos_table,
     "transfer-mujoco": transfer_table,
     "transfer-trials": transfer_trials,
