@@ -149,7 +149,8 @@ def put_try(
         elif moves:
             moved = alone.projected[0, axis]
         if tries.plant.shape[0] > 0:
-            action[0, axis, place] = (moved - start) / rules.step_limit[axis]
+            # A command that begins beyond a limit comes back at once.
+            action[0, axis, place] = min(max((moved - start) / rules.step_limit[axis], -1.0), 1.0)
         else:
             target[0, axis, place] = min(max(moved, chain.lower[axis]), chain.upper[axis])
     if tries.holds.shape[0] > 0:
