@@ -28,10 +28,8 @@ ROBOTS, EPISODES, CONFIGURATIONS = ("ur5", "panda"), 512, 16_000
 def robots() -> Iterator[tuple[str, ...]]:
     """Rates of shipped arms with meshes between the paper's benches, on one thread [1/s]."""
     for arm in ROBOTS:
-        simulator, rng = (
-            Simulator(PROBLEMS["both"].replace(arm=arm), threads=1),
-            np.random.default_rng(0),
-        )
+        simulator = Simulator(PROBLEMS["both"].replace(arm=arm), threads=1)
+        rng = np.random.default_rng(0)
         scenarios = simulator.sample(rng, EPISODES)
         shape = EPISODES, simulator.task.horizon, simulator.n_actions
         actions = rng.uniform(-1, 1, shape)
@@ -64,11 +62,8 @@ def main() -> None:
     ours = template_environment().get_template("speed.md").render(document)
     begin, _, table = ours.partition("\n\n| what")
     parts = [begin, "", "## Peers\n", *peers.page(load_policy(POLICY), REPETITIONS)]
-    parts += [
-        "",
-        "## Arms with meshes\n",
-        markdown_table(("arm", "what", "median", "best"), robots()),
-    ]
+    meshes = markdown_table(("arm", "what", "median", "best"), robots())
+    parts += ["", "## Arms with meshes\n", meshes]
     parts += [*limits.page(POLICY, REPETITIONS), "## Everything\n", f"| what{table}"]
     write_text(folder / "SPEED.md", "\n".join(parts))
     sys.stdout.write("\n".join(parts))
