@@ -120,6 +120,7 @@ def main(out: Path) -> None:
             **{key: value for key, value in os.environ.items() if key != "VIRTUAL_ENV"},
             "KINARM_CACHE": f"{name}/cache",
             "COLUMNS": "80",
+            "PIP_QUIET": "1",  # or it names folders of this machine
         }
         subprocess.run(["git", "clone", "--quiet", ROOT, clone], check=True)
         steps = []

@@ -60,11 +60,11 @@ def main() -> None:
     document = {"command": command, **measure(POLICY, REPETITIONS, ppo=True)}
     write_text(folder / "speed.json", json.dumps(document, indent=1) + "\n")
     ours = template_environment().get_template("speed.md").render(document)
-    begin, _, table = ours.partition("\n\n| what")
-    parts = [begin, "", "## Peers\n", *peers.page(load_policy(POLICY), REPETITIONS)]
+    title, made, table = ours.split("\n\n", 2)
+    parts = [title, "", made, "", "## Peers\n", *peers.page(load_policy(POLICY), REPETITIONS)]
     meshes = markdown_table(("arm", "what", "median", "best"), robots())
     parts += ["", "## Arms with meshes\n", meshes]
-    parts += [*limits.page(POLICY, REPETITIONS), "## Everything\n", f"| what{table}"]
+    parts += [*limits.page(POLICY, REPETITIONS), "## Everything\n", table]
     write_text(folder / "SPEED.md", "\n".join(parts))
     sys.stdout.write("\n".join(parts))
 

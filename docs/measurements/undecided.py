@@ -12,10 +12,11 @@ from typing import Any
 
 import numpy as np
 
-from kinarm import PROBLEMS, ReachProblem, arm_names
+from kinarm import PROBLEMS, ReachProblem, World, arm_names
 from kinarm._files import write_text
+from kinarm.evaluation import oracle_bounds
+from kinarm.evaluation.problem_check import check_problem
 from kinarm.evaluation.trials import TrialSet
-from kinarm.policies import Oracle
 
 RECORD = Path(__file__).resolve().parents[2] / "data/results/plans/undecided.json"
 
@@ -50,16 +51,15 @@ def task_of(arm: str) -> ReachProblem:
 def row_of(arm: str) -> dict[str, Any]:
     """Shares of trials, and steps divided by their bounds."""
     problem = task_of(arm)
-    trials = TrialSet.draw(problem, TRIALS, 0)
-    found = Oracle(problem).solve_batch(trials.starts, trials.goals)
-    proven = found.steps_lower_bound > problem.task.horizon
+    shares = check_problem(World(problem), TRIALS)
+    found = oracle_bounds(TrialSet.draw(problem, TRIALS, 0))  # which the check has solved
     ratios = (found.steps / found.steps_lower_bound)[found.reachable]
     return {
         "arm": arm,
         "nearer": NEARER.get(arm, (1.0, 1.0)),
-        "reached": float(found.reachable.mean()),
-        "out of reach": float(proven.mean()),
-        "undecided": float((~found.reachable & ~proven).mean()),
+        "reached": shares.reached.value,
+        "out of reach": shares.out_of_reach.value,
+        "undecided": shares.undecided.value,
         "step ratio": [float(ratios.mean()), float(np.quantile(ratios, 0.95))],
     }
 
