@@ -71,6 +71,8 @@ class ContactShapes(NamedTuple):
         infinite if they lie outside.
     extents : ndarray, shape (n_bodies, 2, 3)
         Lower and upper ends of the corners [m].
+    balls : ndarray, shape (n_bodies, 4)
+        Centre and radius of a ball about the corners [m].
     planes : ndarray of int, shape (n_pairs, 5)
         Carrier of the separating plane; mover against it; its first axis, and
         the one after the last; frame of the plane, which is the world's for
@@ -96,6 +98,7 @@ class ContactShapes(NamedTuple):
     rounding: Array
     excess: Array
     extents: Array
+    balls: Array
     planes: NDArray[np.int64]
     proxies: NDArray[np.int64]
     farthest: Array
@@ -151,6 +154,14 @@ class ContactShapes(NamedTuple):
                 # The fine polytope has all corners of the coarse one.
                 corners = bodies[finer[mover]].corners
                 travel[axis, column] = point_speed(arm.chain, axis, links[mover], corners)
+        extents = np.array(
+            [(body.corners.min(axis=0), body.corners.max(axis=0)) for body in bodies]
+        ).reshape(-1, 2, 3)
+        middles = extents.mean(axis=1)
+        radii = [
+            np.sqrt(np.square(body.corners - middle).sum(axis=1).max())
+            for body, middle in zip(bodies, middles, strict=True)
+        ]
         inner = map(inner_capsule, objects)
         capsules = [np.append(each.corners, each.rounding) for each in inner]
         capsules += [np.append(AXIS, 0.0 if each.exact else -np.inf) for each in surroundings]
@@ -166,9 +177,8 @@ class ContactShapes(NamedTuple):
             blocks=np.concatenate([*blocks, np.zeros((0, 4, LANES))]),
             rounding=np.array([body.rounding for body in bodies], dtype=np.float64),
             excess=np.array([body.excess for body in bodies], dtype=np.float64),
-            extents=np.array(
-                [(body.corners.min(axis=0), body.corners.max(axis=0)) for body in bodies]
-            ).reshape(-1, 2, 3),
+            extents=extents,
+            balls=np.column_stack([middles, radii]),
             planes=np.array(planes, dtype=np.int64).reshape(-1, 5),
             proxies=np.array(proxies, dtype=np.int64).reshape(-1, 2, 2),
             farthest=travel[: arm.n_actuated].max(axis=1, initial=0.0),

@@ -326,7 +326,8 @@ class World(GoalKinematics, StepContact):
             sizes = {"n_pairs": len(shapes.pairs), "n_placed": len(shapes.placed)}
             space = work_space(n_joints=self.arm.n_joints, **sizes)
             furnish(shapes.placed, *space)
-        n_proven = screen(first, last, *space, *arrays)
+        rows = np.arange(first, last)
+        n_proven = screen(first, last, rows, *space, *arrays)
         self._idle.append(space)
         return n_proven
 

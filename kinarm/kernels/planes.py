@@ -75,6 +75,15 @@ def surface(poses: Array, frame: int) -> tuple[float, float, float, float]:
 
 
 @inlined
+def box_about(shapes: ContactShapes, body: int, poses: Array) -> tuple[Vector, Vector]:
+    """Lower and upper ends of the corners of a body of the scene, in its frame [m]."""
+    frame = shapes.bodies[body, 2]
+    sx, sy, sz = poses[frame, 0], poses[frame, 1], poses[frame, 2]
+    low, high = shapes.extents[body, 0], shapes.extents[body, 1]
+    return (sx * low[0], sy * low[1], sz * low[2]), (sx * high[0], sy * high[1], sz * high[2])
+
+
+@inlined
 def lowest(shapes: ContactShapes, body: int, x: float, y: float, z: float) -> float:
     """Least coordinate of a body's corners along a vector of its joint frame."""
     corners, first, last = shapes.corners, shapes.bodies[body, 0], shapes.bodies[body, 1]
@@ -104,34 +113,77 @@ def height_above(
     return along + lowest(shapes, mover, x, y, z) - plane[row, OFFSET] - shapes.rounding[mover]
 
 
-@helper
-def propose(shapes: ContactShapes, pair: int, poses: Array, plane: Array, row: int) -> None:
-    """Fill in a row of the planes with a likely plane for a pair, without its height.
+@inlined
+def between_balls(shapes: ContactShapes, pair: int, poses: Array) -> float:
+    """Lower bound of a pair's distance: of a ball from a ball, a box or a half-space [m]."""
+    balls, carrier, mover = shapes.balls, shapes.planes[pair, 0], shapes.planes[pair, 1]
+    frame, link = shapes.bodies[carrier, 2], shapes.bodies[mover, 2]
+    x, y, z = to_world(poses, link, balls[mover, 0], balls[mover, 1], balls[mover, 2])
+    around = balls[mover, 3] + shapes.rounding[mover]
+    if shapes.pairs[pair, 0] == WITH_HALFSPACE:
+        nx, ny, nz, offset = surface(poses, frame)
+        return nx * x + ny * y + nz * z - offset - around - poses[frame, 3]
+    if is_placed(shapes, frame, poses):
+        x, y, z = to_frame(poses, frame, (x, y, z))
+        lower, upper = box_about(shapes, carrier, poses)
+        x -= min(max(x, lower[0]), upper[0])
+        y -= min(max(y, lower[1]), upper[1])
+        z -= min(max(z, lower[2]), upper[2])
+        around += poses[frame, 3]
+    else:
+        u, v, w = to_world(poses, frame, balls[carrier, 0], balls[carrier, 1], balls[carrier, 2])
+        x, y, z, around = x - u, y - v, z - w, around + balls[carrier, 3] + shapes.rounding[carrier]
+    return math.sqrt(x * x + y * y + z * z) - around
 
-    Its normal leads from the carrier's axis, or the box about it, to the mover's axis.
+
+@inlined
+def radius_of(shapes: ContactShapes, body: int, poses: Array) -> float:
+    """Radius of a body's capsule [m]; minus infinity if nothing in the body is known."""
+    frame = shapes.bodies[body, 2]
+    radius = 0.0 * poses[0, 13] + shapes.capsules[body, 6]
+    if is_placed(shapes, frame, poses):
+        radius += poses[frame, 3]
+    return radius
+
+
+@helper
+def approach(shapes: ContactShapes, pair: int, poses: Array) -> tuple[float, Vector]:
+    """Lower bound of a pair's overlap, negative if apart [m], and a likely normal of its plane.
+
+    What lies in the bodies overlaps if two points of it are closer than the radii about them. The
+    normal, of any length and in the carrier's frame, leads from there to the mover's axis: from
+    the carrier's axis, the box about it, or its surface.
     """
     kind, carrier, mover = shapes.pairs[pair, 0], shapes.planes[pair, 0], shapes.planes[pair, 1]
     frame = shapes.bodies[carrier, 2]
-    if kind == WITH_HALFSPACE:
-        if in_world(shapes, pair):
-            x, y, z, offset = surface(poses, frame)
-        else:
-            none = 0.0 * poses[frame, 13]
-            x, y, z, offset = none, none, none + 1.0, none
-        plane[row, 0], plane[row, 1], plane[row, 2], plane[row, OFFSET] = x, y, z, offset
-        return
+    radius = radius_of(shapes, mover, poses) + radius_of(shapes, carrier, poses)
     a, b = axis_in_world(shapes, mover, poses)
+    if kind == WITH_HALFSPACE:
+        x, y, z, offset = surface(poses, frame)
+        start, end = x * a[0] + y * a[1] + z * a[2], x * b[0] + y * b[1] + z * b[2]
+        return radius - (min(start, end) - offset), (0.0 * x, 0.0 * x, 0.0 * x + 1.0)
     if kind == BETWEEN_CAPSULES:
         c, d = axis_in_world(shapes, carrier, poses)
         x, y, z = between_segments(a, b, c, d)
         x, y, z = rotated_back(poses, frame, x, y, z)
     else:
-        sx, sy, sz = poses[frame, 0], poses[frame, 1], poses[frame, 2]
-        low, high = shapes.extents[carrier, 0], shapes.extents[carrier, 1]
-        lower = (sx * low[0], sy * low[1], sz * low[2])
-        upper = (sx * high[0], sy * high[1], sz * high[2])
         a, b = to_frame(poses, frame, a), to_frame(poses, frame, b)
-        x, y, z = from_box(a, b, lower, upper)
+        x, y, z = from_box(a, b, *box_about(shapes, carrier, poses))
+    return radius - math.sqrt(x * x + y * y + z * z), (x, y, z)
+
+
+@helper
+def propose(shapes: ContactShapes, pair: int, poses: Array, plane: Array, row: int) -> None:
+    """Fill in a row of the planes with a likely plane for a pair, without its height."""
+    lay_plane(shapes, pair, poses, approach(shapes, pair, poses)[1], plane, row)
+
+
+@helper
+def lay_plane(
+    shapes: ContactShapes, pair: int, poses: Array, along: Vector, plane: Array, row: int
+) -> None:
+    """Fill in a row of the planes: above a pair's carrier, with a normal in its frame."""
+    (x, y, z), frame = along, shapes.bodies[shapes.planes[pair, 0], 2]
     norm = math.sqrt(x * x + y * y + z * z)
     inside = norm < 1e-9
     x, y, z = x / norm, y / norm, z / norm
@@ -185,8 +237,9 @@ def separate(
     relative: Array,
     simplex: Array,
     plane: Array,
+    enough: float = math.inf,
 ) -> tuple[float, bool]:
-    """Find a plane that separates a pair well.
+    """Find a plane that separates a pair well, or by more than is ``enough`` [m].
 
     Returns the mover's height above it [m], and whether they surely touch. Takes poses of numbers.
     The plane, shape (1, PLANE), is replaced by a better one.
@@ -235,6 +288,8 @@ def separate(
             plane[0, 0], plane[0, 1], plane[0, 2] = nx, ny, nz
             plane[0, OFFSET] = above + widened
         missing = norm - max(best, 0.0)
+        if best - rounding > enough:
+            break
         if missing <= CLOSE or missing <= COARSE * (best - rounding) or norm <= inner:
             break
         simplex[size, 0], simplex[size, 1], simplex[size, 2] = wx, wy, wz

@@ -8,14 +8,26 @@ Along the step it is the least height of some corners, whose second derivative i
 nothing, a better plane is taken, and then each configuration or interval between.
 """
 
+import math
+
 from kinarm.chain import Chain
 from kinarm.contact_shapes import PLANE, WITH_HALFSPACE, ContactShapes
 from kinarm.episodes import INTERVALS
 from kinarm.kernels.compiling import Array, helper, inlined
 from kinarm.kernels.lane_copies import moving_frame, place_between, put, take, take_rows
 from kinarm.kernels.lanes import any_lane, as_numbers, lane_bits, select
-from kinarm.kernels.overlap import overlap
-from kinarm.kernels.planes import DEPTH, EVERYDAY, FINE, GAP, height_above, propose, separate
+from kinarm.kernels.planes import (
+    DEPTH,
+    EVERYDAY,
+    FINE,
+    GAP,
+    approach,
+    between_balls,
+    height_above,
+    lay_plane,
+    propose,
+    separate,
+)
 from kinarm.kernels.work_space import Alone, Block
 
 MARGIN = 2e-6
@@ -164,7 +176,7 @@ def prove_alone(
             continue
         if is_apart(as_numbers(block.bound)[pair, lane]):
             continue
-        if tested == 0 and overlap(shapes, pair, alone.after) > -SURE_CONTACT:
+        if tested == 0 and approach(shapes, pair, alone.after)[0] > -SURE_CONTACT:
             return -1 - pair
         bend = bends[pair, lane]
         first, last = heights[pair, lane], planes[pair, GAP, lane]
@@ -260,7 +272,8 @@ def verdict_of(
         height -= 0.125 * bend
     if not is_apart(height) and shapes.pairs[pair, 0] != WITH_HALFSPACE:
         work = alone.relative, alone.simplex, alone.plane
-        height, touching = separate(shapes, pair, alone.before, *work)
+        enough = MARGIN if bend < 0.0 else math.inf
+        height, touching = separate(shapes, pair, alone.before, *work, enough)
         if bend >= 0.0:
             height = min(height, height_above(shapes, pair, FINE, alone.after, alone.plane, 0))
             height -= 0.125 * bend
@@ -288,22 +301,33 @@ def prove_configuration(
 
 @inlined
 def prove_configurations(
-    shapes: ContactShapes, touched: int, filled: int, block: Block, alone: Alone
+    shapes: ContactShapes, filled: int, hasty: bool, block: Block, alone: Alone
 ) -> tuple[int, int]:
-    """Bits of the arms that are proven free, and of those that touch, more than those ``touched``.
+    """Bits of the arms that are proven free, and of those that touch.
 
-    Takes the poses ``after``, and gives all pairs a first plane.
+    Takes the poses ``after``, and gives all pairs a first plane. If it is ``hasty``, pairs whose
+    balls are apart get none, nor do those of arms that touch.
     """
-    least = 0.0 * block.q[0, 0] + 1.0
+    poses, planes = block.after, block.planes
+    least, depth = 0.0 * block.q[0, 0] + 1.0, 0.0 * block.q[0, 0] - 1.0
     for pair in range(shapes.planes.shape[0]):
-        propose(shapes, pair, block.after, block.planes, pair)
-        height = height_above(shapes, pair, EVERYDAY, block.after, block.planes, pair)
-        block.planes[pair, GAP] = height
-        least = min(least, height)
-    free = lane_bits(is_apart(least))
+        bound = 0.0 * depth - math.inf
+        if hasty:
+            bound = between_balls(shapes, pair, poses)
+            if any_lane(~is_apart(bound) & (depth <= DEPTH)):
+                overlap, along = approach(shapes, pair, poses)
+                depth = max(depth, overlap)
+                lay_plane(shapes, pair, poses, along, planes, pair)
+        else:
+            propose(shapes, pair, poses, planes, pair)
+        if any_lane(~is_apart(bound) & (depth <= DEPTH)):
+            bound = max(bound, height_above(shapes, pair, EVERYDAY, poses, planes, pair))
+        least = min(least, bound)
+        planes[pair, GAP] = bound
+    free, touched = lane_bits(is_apart(least)), lane_bits(depth > DEPTH)
     for lane in range(filled):
         if (free | touched) >> lane & 1 == 0:
-            verdict = prove_configuration(lane, shapes, block.after, block, alone)
+            verdict = prove_configuration(lane, shapes, poses, block, alone)
             free |= 1 << lane if verdict > 0 else 0
             touched |= 1 << lane if verdict < 0 else 0
     return free, touched
@@ -333,7 +357,7 @@ def first_contact(
     place_between(k, parts, lane, chain, shapes, block, alone, alone.before)
     enough = DEPTH if tested > 0 else -SURE_CONTACT
     for pair in range(shapes.pairs.shape[0]):
-        if overlap(shapes, pair, alone.before) > enough:
+        if approach(shapes, pair, alone.before)[0] > enough:
             return pair + 1
         verdict = verdict_of(pair, lane, -1.0, shapes, block, alone)
         if verdict < 0:

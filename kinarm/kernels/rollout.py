@@ -52,7 +52,7 @@ def begin(counter: NDArray[np.int64], session: Session, rows: NDArray[np.int64])
                 step = episodes.steps[e]
                 move_bodies(e, step, lane, shapes, rules, episodes.scenes, block.after)
         forward_kinematics(chain, block.q, 0, block.after)
-        free, _ = prove_configurations(shapes, 0, filled, block, alone)
+        free, _ = prove_configurations(shapes, filled, False, block, alone)
         if block.turn.shape[0] > 0:
             pursuit = episodes.pursuit
             if pursuit.goals.shape[0] > 0:

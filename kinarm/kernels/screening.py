@@ -4,13 +4,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kinarm.chain import Chain
-from kinarm.contact_shapes import ContactShapes
+from kinarm.contact_shapes import WITH_HALFSPACE, ContactShapes
 from kinarm.kernels.compiling import Array, lean_kernel
 from kinarm.kernels.kinematics import forward_kinematics, to_world
 from kinarm.kernels.lane_copies import put, put_scene, take
 from kinarm.kernels.lanes import LANES, lane_bits
-from kinarm.kernels.overlap import deepest_overlap
-from kinarm.kernels.planes import DEPTH
+from kinarm.kernels.planes import DEPTH, approach
 from kinarm.kernels.proof import prove_configurations
 from kinarm.kernels.work_space import Alone, Block
 
@@ -19,6 +18,7 @@ from kinarm.kernels.work_space import Alone, Block
 def screen(
     first: int,
     last: int,
+    rows: NDArray[np.int64],
     block: Block,
     alone: Alone,
     chain: Chain,
@@ -35,6 +35,8 @@ def screen(
     ----------
     first, last : int
         Range of rows.
+    rows : ndarray of int, shape (last - first,)
+        These; changed.
     block, alone, chain, shapes
         Work space, the arm, and what may touch.
     configurations : ndarray, shape (n, n_joints)
@@ -50,21 +52,35 @@ def screen(
         Of how many one is proven; Coal decides about the others.
     """
     n_joints, tool = configurations.shape[1], chain.tool
-    n_proven = 0
-    for start in range(first, last, LANES):
-        filled = min(last - start, LANES)
-        for lane in range(LANES):
-            row = start + min(lane, filled - 1)
-            put(configurations, row, block.q, 0, lane)
-            put_scene(scenes, row, lane, block.after)
-        forward_kinematics(chain, block.q, 0, block.after)
-        touched = lane_bits(deepest_overlap(shapes, block.after) > DEPTH)
-        apart, touched = prove_configurations(shapes, touched, filled, block, alone)
-        x, y, z = to_world(block.after, n_joints, tool[0], tool[1], tool[2])
-        block.goal[0, 0], block.goal[0, 1], block.goal[0, 2] = x, y, z
-        for lane in range(filled):
-            free[start + lane] = apart >> lane & 1 != 0
-            touching[start + lane] = touched >> lane & 1 != 0
-            n_proven += (apart | touched) >> lane & 1
-            take(block.goal, 0, lane, tools, start + lane)
-    return n_proven
+    n_left = last - first
+    # Half-spaces first: arms that reach into one fill no lanes later.
+    for others in range(2):
+        n_rows, n_left = n_left, 0
+        for start in range(0, n_rows, LANES):
+            filled = min(n_rows - start, LANES)
+            for lane in range(LANES):
+                row = rows[start + min(lane, filled - 1)]
+                put(configurations, row, block.q, 0, lane)
+                put_scene(scenes, row, lane, block.after)
+            forward_kinematics(chain, block.q, 0, block.after)
+            apart, touched = 0, 0
+            if others:
+                apart, touched = prove_configurations(shapes, filled, True, block, alone)
+            else:
+                depth = 0.0 * block.q[0, 0] - 1.0
+                for pair in range(shapes.pairs.shape[0]):
+                    if shapes.pairs[pair, 0] == WITH_HALFSPACE:
+                        depth = max(depth, approach(shapes, pair, block.after)[0])
+                touched = lane_bits(depth > DEPTH)
+                x, y, z = to_world(block.after, n_joints, tool[0], tool[1], tool[2])
+                block.goal[0, 0], block.goal[0, 1], block.goal[0, 2] = x, y, z
+            for lane in range(filled):
+                row = rows[start + lane]
+                if others == 0:
+                    take(block.goal, 0, lane, tools, row)
+                free[row] = apart >> lane & 1 != 0
+                touching[row] = touched >> lane & 1 != 0
+                if not free[row] and not touching[row]:
+                    rows[n_left] = row
+                    n_left += 1
+    return last - first - n_left

@@ -3,7 +3,7 @@
 import numpy as np
 
 from kinarm.collision import Step
-from kinarm.contact_shapes import WITH_HALFSPACE, ContactShapes
+from kinarm.contact_shapes import ContactShapes
 from kinarm.kernels.compiling import Array
 from kinarm.kernels.lanes import LANES
 from kinarm.kernels.records import recorded
@@ -48,12 +48,6 @@ class Motions:
             n_joints=world.arm.n_joints, n_actuated=world.arm.n_actuated, **sizes
         )
         furnish(shapes.placed, *self._space)
-        middle = 0.5 * (shapes.extents[:, 0] + shapes.extents[:, 1])
-        radii = [
-            np.sqrt(np.square(shapes.corners[first:last] - centre).sum(axis=1).max())
-            for centre, (first, last) in zip(middle, shapes.bodies[:, :2], strict=True)
-        ]
-        self._balls = np.column_stack([middle, radii])
         self.farthest = shapes.farthest
         self.speeds = world.arm.velocity_limits[: self.moved]
         before = np.cumsum(self.speeds) - self.speeds
@@ -81,7 +75,7 @@ class Motions:
         ends = np.array([first, second])
         part, parts = 0, LANES * max(1, int(np.ceil(self.durations(*ends) / self._longest)))
         while True:
-            part = sweep(ends, part, parts, *self._space, self._chain, self._shapes, self._balls)
+            part = sweep(ends, part, parts, *self._space, self._chain, self._shapes)
             if part < 0 or part == parts or not asking:
                 return (-1 - part if part < 0 else part) / parts
             low, high = part / parts, (part + 1) / parts
@@ -108,7 +102,4 @@ def widened(shapes: ContactShapes, margin: float) -> ContactShapes:
     rounding[of_arm] += margin / 2
     capsules[: len(capsules) - n_placed, 6] += margin / 2
     placed[:, 3] += margin / 2
-    kind, _, body = shapes.pairs.T
-    flat = np.unique(body[kind == WITH_HALFSPACE]) - (len(capsules) - n_placed)
-    placed[flat, 13:] += margin / 2 * placed[flat][:, [6, 9, 12]]
     return shapes._replace(rounding=rounding, capsules=capsules, placed=placed)

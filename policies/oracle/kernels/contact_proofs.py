@@ -17,8 +17,7 @@ from kinarm.kernels.compiling import Array, Vector, helper, inlined
 from kinarm.kernels.distance import between_segments, closest_to_box
 from kinarm.kernels.kinematics import point_jacobian, rotated_back, to_frame
 from kinarm.kernels.lanes import any_lane, select
-from kinarm.kernels.overlap import radius_of
-from kinarm.kernels.planes import DEPTH, axis_in_world, surface
+from kinarm.kernels.planes import DEPTH, axis_in_world, radius_of, surface
 
 TRIED = 5
 """Evenly spaced points of an axis tried as the deepest, beside the closest."""

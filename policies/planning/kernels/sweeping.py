@@ -1,20 +1,11 @@
 """Kernel that proves straight motions of an arm free of contact."""
 
-import math
-
 from kinarm.chain import Chain
-from kinarm.contact_shapes import WITH_HALFSPACE, ContactShapes
-from kinarm.kernels.compiling import Array, inlined, lean_kernel
-from kinarm.kernels.kinematics import forward_kinematics, to_frame, to_world
+from kinarm.contact_shapes import ContactShapes
+from kinarm.kernels.compiling import Array, lean_kernel
+from kinarm.kernels.kinematics import forward_kinematics
 from kinarm.kernels.lanes import LANES, any_lane, as_numbers, lane_bits
-from kinarm.kernels.planes import (
-    EVERYDAY,
-    GAP,
-    height_above,
-    is_placed,
-    propose,
-    surface,
-)
+from kinarm.kernels.planes import EVERYDAY, GAP, between_balls, height_above, propose
 from kinarm.kernels.proof import first_contact, is_apart, prove_alone, twist_step
 from kinarm.kernels.work_space import Alone, Block
 
@@ -31,7 +22,6 @@ def sweep(
     alone: Alone,
     chain: Chain,
     shapes: ContactShapes,
-    balls: Array,
 ) -> int:
     """Prove parts of a motion free, in turn, a lane for each.
 
@@ -43,8 +33,6 @@ def sweep(
         The first part, from 0, and how many equal ones the motion has.
     block, alone, chain, shapes
         Work space, the arm, and what may touch.
-    balls : ndarray, shape (n_bodies, 4)
-        Centre and radius of a ball about the corners of each body [m].
 
     Returns
     -------
@@ -69,7 +57,7 @@ def sweep(
             for moved in range(shapes.planes[pair, 2], shapes.planes[pair, 3]):
                 turn = abs(block.target[0, moved] - block.q[0, moved])
                 motion += turn * shapes.travel[moved, pair]
-            block.bound[pair] = between_balls(shapes, balls, pair, block.after) - 0.5 * motion
+            block.bound[pair] = between_balls(shapes, pair, block.after) - 0.5 * motion
         forward_kinematics(chain, block.q, 0, block.before)
         forward_kinematics(chain, block.target, 0, block.after)
         twist_step(block)
@@ -99,27 +87,3 @@ def sweep(
                 return -1 - part - lane if first_contact(lane, doubt, *known) else part + lane
         part += LANES
     return parts
-
-
-@inlined
-def between_balls(shapes: ContactShapes, balls: Array, pair: int, poses: Array) -> float:
-    """Lower bound of a pair's distance: of a ball from a ball, a box or a half-space [m]."""
-    carrier, mover = shapes.planes[pair, 0], shapes.planes[pair, 1]
-    frame, link = shapes.bodies[carrier, 2], shapes.bodies[mover, 2]
-    x, y, z = to_world(poses, link, balls[mover, 0], balls[mover, 1], balls[mover, 2])
-    around = balls[mover, 3] + shapes.rounding[mover]
-    if shapes.pairs[pair, 0] == WITH_HALFSPACE:
-        nx, ny, nz, offset = surface(poses, frame)
-        return nx * x + ny * y + nz * z - offset - around
-    if is_placed(shapes, frame, poses):
-        x, y, z = to_frame(poses, frame, (x, y, z))
-        low, high = shapes.extents[carrier, 0], shapes.extents[carrier, 1]
-        sx, sy, sz = poses[frame, 0], poses[frame, 1], poses[frame, 2]
-        x -= min(max(x, sx * low[0]), sx * high[0])
-        y -= min(max(y, sy * low[1]), sy * high[1])
-        z -= min(max(z, sz * low[2]), sz * high[2])
-        around += poses[frame, 3]
-    else:
-        u, v, w = to_world(poses, frame, balls[carrier, 0], balls[carrier, 1], balls[carrier, 2])
-        x, y, z, around = x - u, y - v, z - w, around + balls[carrier, 3] + shapes.rounding[carrier]
-    return math.sqrt(x * x + y * y + z * z) - around

@@ -6,12 +6,19 @@ from numba import njit
 
 from kinarm.contact_shapes import PLANE, WITH_HALFSPACE
 from kinarm.kernels.kinematics import POSE, forward_kinematics, place_bodies
-from kinarm.kernels.planes import EVERYDAY, FINE, height_above, propose, separate
+from kinarm.kernels.planes import (
+    EVERYDAY,
+    FINE,
+    between_balls,
+    height_above,
+    propose,
+    separate,
+)
 
 
 @njit
-def heights(chain, shapes, configurations, proposed, separated, again, coarse, touching):
-    """Heights above planes as proposed; as bettered, told and anew; and so with coarse movers.
+def heights(chain, shapes, configurations, balls, proposed, separated, again, coarse, touching):
+    """Distances of balls; heights above planes as proposed; as bettered, told, anew and coarsely.
 
     And 1 where bodies are said to touch.
     """
@@ -21,6 +28,7 @@ def heights(chain, shapes, configurations, proposed, separated, again, coarse, t
     for i in range(len(configurations)):
         forward_kinematics(chain, configurations, i, poses)
         for pair in range(len(shapes.planes)):
+            balls[i, pair] = between_balls(shapes, pair, poses)
             propose(shapes, pair, poses, plane, 0)
             proposed[i, pair] = height_above(shapes, pair, EVERYDAY, poses, plane, 0)
             separated[i, pair] = height_above(shapes, pair, FINE, poses, plane, 0)
@@ -34,11 +42,11 @@ def heights(chain, shapes, configurations, proposed, separated, again, coarse, t
 def test_heights_are_no_more_than_the_distance_and_bettered_planes_tight(any_simulator):
     configurations = random_configurations(any_simulator, 21, 500)
     shapes = any_simulator.world.contact_model.shapes
-    found = np.zeros((5, len(configurations), len(shapes.planes)))
+    found = np.zeros((6, len(configurations), len(shapes.planes)))
     heights(any_simulator.arm.chain, shapes, configurations, *found)
     exact = pair_distances(any_simulator.world, configurations)
-    proposed, separated, again, coarse, touching = found
-    assert (found[:4] <= np.fmax(exact, 0) + 1e-6).all()
+    balls, proposed, separated, again, coarse, touching = found
+    assert (found[:5] <= np.fmax(exact, 0) + 1e-6).all()
     assert (exact[touching > 0] < -9e-7).all()
     known = np.isfinite(shapes.excess[shapes.proxies[:, FINE]]).all(axis=1)
     deep = (exact < -3e-4) & known & (shapes.pairs[:, 0] != WITH_HALFSPACE)
@@ -49,5 +57,6 @@ def test_heights_are_no_more_than_the_distance_and_bettered_planes_tight(any_sim
     loose = 0.0 if shapes.exact.all() else 2e-3
     assert (missing <= 0.021 * exact[apart] + 2e-6 + loose).all()
     assert (coarse <= separated + 1e-12).all()
+    assert (balls[exact > 0.5] > 0).mean() > 0.5
     if shapes.exact.all():
         assert (proposed >= 0.99 * exact)[apart].mean() > 0.97
