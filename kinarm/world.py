@@ -326,8 +326,7 @@ class World(GoalKinematics, StepContact):
             sizes = {"n_pairs": len(shapes.pairs), "n_placed": len(shapes.placed)}
             space = work_space(n_joints=self.arm.n_joints, **sizes)
             furnish(shapes.placed, *space)
-        rows = np.arange(first, last)
-        n_proven = screen(first, last, rows, *space, *arrays)
+        n_proven = screen(first, last, np.arange(first, last), *space, *arrays)
         self._idle.append(space)
         return n_proven
 

@@ -114,7 +114,7 @@ def height_above(
 
 
 @inlined
-def between_balls(shapes: ContactShapes, pair: int, poses: Array) -> float:
+def ball_gap(shapes: ContactShapes, pair: int, poses: Array) -> float:
     """Lower bound of a pair's distance: of a ball from a ball, a box or a half-space [m]."""
     balls, carrier, mover = shapes.balls, shapes.planes[pair, 0], shapes.planes[pair, 1]
     frame, link = shapes.bodies[carrier, 2], shapes.bodies[mover, 2]

@@ -15,16 +15,14 @@ from kinarm.contact_shapes import PLANE, WITH_HALFSPACE, ContactShapes
 from kinarm.episodes import INTERVALS
 from kinarm.kernels.compiling import Array, helper, inlined
 from kinarm.kernels.lane_copies import moving_frame, place_between, put, take, take_rows
-from kinarm.kernels.lanes import any_lane, as_numbers, lane_bits, select
+from kinarm.kernels.lanes import any_lane, as_numbers, select
 from kinarm.kernels.planes import (
     DEPTH,
     EVERYDAY,
     FINE,
     GAP,
     approach,
-    between_balls,
     height_above,
-    lay_plane,
     propose,
     separate,
 )
@@ -279,58 +277,6 @@ def verdict_of(
             height -= 0.125 * bend
     apart = height > (SURE_FREEDOM if bend >= 0.0 else MARGIN)
     return 1 if apart else -1 if touching else 0
-
-
-@helper
-def prove_configuration(
-    lane: int, shapes: ContactShapes, poses: Array, block: Block, alone: Alone
-) -> int:
-    """1 if an episode's configuration is proven free, -1 if it touches something, else 0."""
-    found, plane, planes = 1, alone.plane, as_numbers(block.planes)
-    take_rows(poses, lane, alone.before)
-    for pair in range(shapes.planes.shape[0]):
-        if is_apart(planes[pair, GAP, lane]):
-            continue
-        verdict = verdict_of(pair, lane, -1.0, shapes, block, alone)
-        put(plane, 0, block.planes, pair, lane)
-        if verdict < 0:
-            return verdict
-        found = min(found, verdict)
-    return found
-
-
-@inlined
-def prove_configurations(
-    shapes: ContactShapes, filled: int, hasty: bool, block: Block, alone: Alone
-) -> tuple[int, int]:
-    """Bits of the arms that are proven free, and of those that touch.
-
-    Takes the poses ``after``, and gives all pairs a first plane. If it is ``hasty``, pairs whose
-    balls are apart get none, nor do those of arms that touch.
-    """
-    poses, planes = block.after, block.planes
-    least, depth = 0.0 * block.q[0, 0] + 1.0, 0.0 * block.q[0, 0] - 1.0
-    for pair in range(shapes.planes.shape[0]):
-        bound = 0.0 * depth - math.inf
-        if hasty:
-            bound = between_balls(shapes, pair, poses)
-            if any_lane(~is_apart(bound) & (depth <= DEPTH)):
-                overlap, along = approach(shapes, pair, poses)
-                depth = max(depth, overlap)
-                lay_plane(shapes, pair, poses, along, planes, pair)
-        else:
-            propose(shapes, pair, poses, planes, pair)
-        if any_lane(~is_apart(bound) & (depth <= DEPTH)):
-            bound = max(bound, height_above(shapes, pair, EVERYDAY, poses, planes, pair))
-        least = min(least, bound)
-        planes[pair, GAP] = bound
-    free, touched = lane_bits(is_apart(least)), lane_bits(depth > DEPTH)
-    for lane in range(filled):
-        if (free | touched) >> lane & 1 == 0:
-            verdict = prove_configuration(lane, shapes, poses, block, alone)
-            free |= 1 << lane if verdict > 0 else 0
-            touched |= 1 << lane if verdict < 0 else 0
-    return free, touched
 
 
 @helper

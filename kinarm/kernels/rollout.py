@@ -17,8 +17,8 @@ from kinarm.kernels.lanes import LANES, any_lane, as_numbers, lane_bits, select
 from kinarm.kernels.network import choose_actions, shared_policy
 from kinarm.kernels.planes import GAP
 from kinarm.kernels.plant import COMMAND, move_joints, rest, sense
-from kinarm.kernels.proof import prove_configurations
 from kinarm.kernels.reward import ROTATION, add_reward, observe, remember
+from kinarm.kernels.screening import prove_configurations
 from kinarm.kernels.session import SHIELD, Session, load_episode, store_episode, take_number
 from kinarm.kernels.shield import REFUSED, take_down, unsafe_stops
 

@@ -1,17 +1,69 @@
-"""Kernel that screens configurations for contact."""
+"""Proof that single configurations are free of contact, or touch; a kernel screens many."""
+
+import math
 
 import numpy as np
 from numpy.typing import NDArray
 
 from kinarm.chain import Chain
 from kinarm.contact_shapes import WITH_HALFSPACE, ContactShapes
-from kinarm.kernels.compiling import Array, lean_kernel
+from kinarm.kernels.compiling import Array, helper, inlined, lean_kernel
 from kinarm.kernels.kinematics import forward_kinematics, to_world
-from kinarm.kernels.lane_copies import put, put_scene, take
-from kinarm.kernels.lanes import LANES, lane_bits
-from kinarm.kernels.planes import DEPTH, approach
-from kinarm.kernels.proof import prove_configurations
+from kinarm.kernels.lane_copies import put, put_scene, take, take_rows
+from kinarm.kernels.lanes import LANES, any_lane, as_numbers, lane_bits
+from kinarm.kernels.planes import DEPTH, EVERYDAY, GAP, approach, ball_gap, height_above, lay_plane
+from kinarm.kernels.proof import is_apart, verdict_of
 from kinarm.kernels.work_space import Alone, Block
+
+
+@helper
+def prove_configuration(
+    lane: int, shapes: ContactShapes, poses: Array, block: Block, alone: Alone
+) -> int:
+    """1 if an episode's configuration is proven free, -1 if it touches something, else 0."""
+    found, plane, planes = 1, alone.plane, as_numbers(block.planes)
+    take_rows(poses, lane, alone.before)
+    for pair in range(shapes.planes.shape[0]):
+        if is_apart(planes[pair, GAP, lane]):
+            continue
+        verdict = verdict_of(pair, lane, -1.0, shapes, block, alone)
+        put(plane, 0, block.planes, pair, lane)
+        if verdict < 0:
+            return verdict
+        found = min(found, verdict)
+    return found
+
+
+@inlined
+def prove_configurations(
+    shapes: ContactShapes, filled: int, hasty: bool, block: Block, alone: Alone
+) -> tuple[int, int]:
+    """Bits of the arms that are proven free, and of those that touch.
+
+    Takes the poses ``after``, and gives all pairs a first plane. If it is ``hasty``, pairs whose
+    balls are apart get none, nor do those of arms that touch.
+    """
+    poses, planes = block.after, block.planes
+    least, depth = 0.0 * block.q[0, 0] + 1.0, 0.0 * block.q[0, 0] - 1.0
+    for pair in range(shapes.planes.shape[0]):
+        bound = 0.0 * depth - math.inf
+        if hasty:
+            bound = ball_gap(shapes, pair, poses)
+        if any_lane(~is_apart(bound) & (depth <= DEPTH)):
+            overlap, along = approach(shapes, pair, poses)
+            if hasty:
+                depth = max(depth, overlap)
+            lay_plane(shapes, pair, poses, along, planes, pair)
+            bound = max(bound, height_above(shapes, pair, EVERYDAY, poses, planes, pair))
+        least = min(least, bound)
+        planes[pair, GAP] = bound
+    free, touched = lane_bits(is_apart(least)), lane_bits(depth > DEPTH)
+    for lane in range(filled):
+        if (free | touched) >> lane & 1 == 0:
+            verdict = prove_configuration(lane, shapes, poses, block, alone)
+            free |= 1 << lane if verdict > 0 else 0
+            touched |= 1 << lane if verdict < 0 else 0
+    return free, touched
 
 
 @lean_kernel
@@ -63,7 +115,6 @@ def screen(
                 put(configurations, row, block.q, 0, lane)
                 put_scene(scenes, row, lane, block.after)
             forward_kinematics(chain, block.q, 0, block.after)
-            apart, touched = 0, 0
             if others:
                 apart, touched = prove_configurations(shapes, filled, True, block, alone)
             else:
@@ -71,7 +122,7 @@ def screen(
                 for pair in range(shapes.pairs.shape[0]):
                     if shapes.pairs[pair, 0] == WITH_HALFSPACE:
                         depth = max(depth, approach(shapes, pair, block.after)[0])
-                touched = lane_bits(depth > DEPTH)
+                apart, touched = 0, lane_bits(depth > DEPTH)
                 x, y, z = to_world(block.after, n_joints, tool[0], tool[1], tool[2])
                 block.goal[0, 0], block.goal[0, 1], block.goal[0, 2] = x, y, z
             for lane in range(filled):

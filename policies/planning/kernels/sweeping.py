@@ -5,7 +5,7 @@ from kinarm.contact_shapes import ContactShapes
 from kinarm.kernels.compiling import Array, lean_kernel
 from kinarm.kernels.kinematics import forward_kinematics
 from kinarm.kernels.lanes import LANES, any_lane, as_numbers, lane_bits
-from kinarm.kernels.planes import EVERYDAY, GAP, between_balls, height_above, propose
+from kinarm.kernels.planes import EVERYDAY, GAP, ball_gap, height_above, propose
 from kinarm.kernels.proof import first_contact, is_apart, prove_alone, twist_step
 from kinarm.kernels.work_space import Alone, Block
 
@@ -57,7 +57,7 @@ def sweep(
             for moved in range(shapes.planes[pair, 2], shapes.planes[pair, 3]):
                 turn = abs(block.target[0, moved] - block.q[0, moved])
                 motion += turn * shapes.travel[moved, pair]
-            block.bound[pair] = between_balls(shapes, pair, block.after) - 0.5 * motion
+            block.bound[pair] = ball_gap(shapes, pair, block.after) - 0.5 * motion
         forward_kinematics(chain, block.q, 0, block.before)
         forward_kinematics(chain, block.target, 0, block.after)
         twist_step(block)

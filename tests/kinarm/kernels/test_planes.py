@@ -6,14 +6,7 @@ from numba import njit
 
 from kinarm.contact_shapes import PLANE, WITH_HALFSPACE
 from kinarm.kernels.kinematics import POSE, forward_kinematics, place_bodies
-from kinarm.kernels.planes import (
-    EVERYDAY,
-    FINE,
-    between_balls,
-    height_above,
-    propose,
-    separate,
-)
+from kinarm.kernels.planes import EVERYDAY, FINE, ball_gap, height_above, propose, separate
 
 
 @njit
@@ -28,7 +21,7 @@ def heights(chain, shapes, configurations, balls, proposed, separated, again, co
     for i in range(len(configurations)):
         forward_kinematics(chain, configurations, i, poses)
         for pair in range(len(shapes.planes)):
-            balls[i, pair] = between_balls(shapes, pair, poses)
+            balls[i, pair] = ball_gap(shapes, pair, poses)
             propose(shapes, pair, poses, plane, 0)
             proposed[i, pair] = height_above(shapes, pair, EVERYDAY, poses, plane, 0)
             separated[i, pair] = height_above(shapes, pair, FINE, poses, plane, 0)
