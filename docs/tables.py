@@ -163,7 +163,8 @@ def all_parts_table() -> str:
     """Parts of observations that problems may choose."""
     owners = {JOINTS: "joint", ACTUATED: "actuated joint", SLOTS: "slot"}
     lengths = {
-        part: f"{len(part.signs)}{' per ' * (part.of != ONCE)}{owners.get(part.of, '')}"
+        part: f"{len(part.signs)}{' + actuated joints,' * part.sloped}"
+        f"{' per ' * (part.of != ONCE)}{owners.get(part.of, '')}"
         for part in OBSERVATION
     }
     return parts_table("entries", lengths)
@@ -177,7 +178,8 @@ def parts_table(title: str, column: Mapping[Part, str]) -> str:
             f"`{part.name}`",
             part.meaning,
             part.unit,
-            f"`{' '.join(f'{sign:+d}'[0] if sign else 'j' for sign in part.signs)}`",
+            f"`{' '.join(f'{sign:+d}'[0] if sign else 'j' for sign in part.signs)}"
+            f"{' j' * part.sloped}`",
         ]
         for part, first in column.items()
     ]

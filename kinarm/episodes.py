@@ -96,6 +96,8 @@ class Control(NamedTuple):
     rates : int
         First entry of ``resolved_rate``, to which outputs of the networks are added as
         far as there is to go; -1 if outputs are the actions.
+    near : int
+        First entry of ``proximity``, by which sums are turned off bodies; -1 for none.
     actions : ndarray, shape (n_episodes, n_steps, n_actuated)
         The table; one step serves every step.
     """
@@ -108,6 +110,7 @@ class Control(NamedTuple):
     action_signs: Array = np.zeros(0)
     side: int = 0
     rates: int = -1
+    near: int = -1
     actions: Array = np.zeros((0, 0, 0))
 
 

@@ -251,13 +251,18 @@ OBSERVATION = (
         name="proximity",
         meaning=(
             "for each joint's link, a lower bound of the distance to the nearest body, at most "
-            f"{NEAR:g} m, and the direction away from it x, y, z, zeros at {NEAR:g} m"
+            f"{NEAR:g} m, the direction away from it x, y, z, and what the largest step of each "
+            f"actuated joint adds to the distance; zeros at {NEAR:g} m"
         ),
-        unit="m, 1",
+        unit="m, 1, m",
         signs=(1, *POLAR),
-        bounds=lambda _: (np.array([0.0, *[-UNIT] * 3]), np.array([NEAR, *[UNIT] * 3])),
+        bounds=lambda ranges: (
+            np.tile([0.0, *[-UNIT] * 3, *[-LARGEST] * len(ranges.fastest)], len(ranges.lower)),
+            np.tile([NEAR, *[UNIT] * 3, *[LARGEST] * len(ranges.fastest)], len(ranges.lower)),
+        ),
         write=write_proximity,
         of=JOINTS,
+        sloped=True,
         lacks=_is_bare,
     ),
     Part(

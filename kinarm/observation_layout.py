@@ -10,6 +10,7 @@ from kinarm.arm import Arm
 from kinarm.errors import InvalidInputError, ProblemError, finite_array
 from kinarm.goals import REST_PARTS
 from kinarm.kernels.compiling import Array
+from kinarm.kernels.network import turn_away
 from kinarm.observation import OBSERVATION, VERSION
 from kinarm.observation_part import ACTUATED, JOINTS, ONCE, SLOTS, Part, Ranges
 from kinarm.problem import ReachProblem
@@ -66,7 +67,8 @@ class ObservationLayout(NamedTuple):
 
     def length(self, part: Part) -> int:
         """Number of entries of a part in the observation of a step."""
-        return len(part.signs) * self.counts[part.of]
+        slopes = self.counts[ACTUATED] if part.sloped else 0
+        return (len(part.signs) + slopes) * self.counts[part.of]
 
     @property
     def width(self) -> int:
@@ -95,7 +97,9 @@ class ObservationLayout(NamedTuple):
     def rules(self, problem: ReachProblem) -> dict[str, Any]:
         """What `kinarm.episodes.Rules` have of it."""
         turned = problem.task.goal.kind in ("direction", "pose")
-        newton = (6 if turned else 3) if "resolved_rate" in self.places else 0
+        newton = 0
+        if {"resolved_rate", "proximity"} & self.places.keys():
+            newton = 6 if turned else 3
         return {"shown": self.shown, "width": self.width, "newton": newton}
 
     @property
@@ -154,6 +158,16 @@ class ObservationLayout(NamedTuple):
         """Whether a part tells of bodies of the scene."""
         return bool({"proximity", "obstacles"} & self.places.keys())
 
+    def turn_away(self, observations: Array, actions: NDArray[Any]) -> None:
+        """Turn actions off bodies, in place, if ``proximity`` is seen: see `keep_away`.
+
+        Both have one row, or the shapes (n, n_observations) and (n, n_actuated).
+        """
+        if (near := self.places.get("proximity")) is not None:
+            seen = np.ascontiguousarray(observations).reshape(-1, self.size)
+            rows = actions.reshape(len(seen), -1)
+            turn_away(seen, near.start, self.counts[JOINTS], rows)
+
     def entries(self, *, of_goal: bool) -> NDArray[np.int64]:
         """Entries of the parts that depend on the goal, or of the others, of all steps."""
         chosen = np.concatenate([np.full(self.length(p), p.of_goal == of_goal) for p in self.parts])
@@ -168,7 +182,8 @@ class ObservationLayout(NamedTuple):
         for part in self.parts:
             rows = np.tile(np.array(part.signs, dtype=np.float64), (self.counts[part.of], 1))
             of_joint = axes[: len(rows), None] if 0 in part.signs else 1.0
-            signs.append(np.where(rows == 0, of_joint, rows).ravel())
+            slopes = np.tile(axes[: self.counts[ACTUATED] if part.sloped else 0], (len(rows), 1))
+            signs.append(np.hstack([np.where(rows == 0, of_joint, rows), slopes]).ravel())
         return np.tile(np.concatenate(signs), self.history)
 
     def bounds(self, ranges: Ranges) -> tuple[Array, Array]:
@@ -192,7 +207,7 @@ class ObservationLayout(NamedTuple):
 def observation_layout(problem: ReachProblem) -> str:
     """Names and lengths of a problem's parts, to compare."""
     layout, chosen = ObservationLayout.sized(problem, 1, 1), problem.observation
-    parts = (f"{part.name} {len(part.signs)}{part.of}" for part in layout.parts)
+    parts = (f"{part.name} {len(part.signs)}{'+a' * part.sloped}{part.of}" for part in layout.parts)
     slots = f"; k = {chosen.obstacle_slots}" if any(p.of == SLOTS for p in layout.parts) else ""
     history = f"; history {chosen.history}" if chosen.history > 1 else ""
     return f"{VERSION}: {', '.join(parts)}{slots}{history}"

@@ -46,6 +46,8 @@ class Part(NamedTuple):
         Formula; see `write_goal`.
     of : str
         What has one: `ONCE`, `JOINTS`, `ACTUATED` or `SLOTS`.
+    sloped : bool
+        Whether each is followed by what each actuated joint adds to it.
     of_goal : bool
         Whether it depends on the goal.
     lacks : callable
@@ -59,5 +61,6 @@ class Part(NamedTuple):
     bounds: Callable[[Ranges], tuple[Array | float, Array | float]]
     write: Callable[[Session, Seen, int, int], None]
     of: str = ONCE
+    sloped: bool = False
     of_goal: bool = False
     lacks: Callable[["Arm", Scene], str] = lambda *_: ""

@@ -82,7 +82,8 @@ def draw_for_each(
             missed = ~rejected
             tried = pending[missed]
             there = scenes[missed] if len(scenes) else scenes
-            found, goals[tried] = world.solved_goals(aims[missed], drawn[tried, -1], there)
+            asked = aims[missed], drawn[tried, -1], there, proposed[missed]
+            found, goals[tried] = world.solved_goals(*asked)
             missed[missed] = ~found
             rows = pending[missed]
             wanted = np.bincount(rows // max(count, 1), minlength=len(rngs)).tolist()

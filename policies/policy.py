@@ -55,7 +55,8 @@ class Policy:
     shield : bool
         Whether a simulator replaces its steps that would touch; see `shielded`.
     residual : bool
-        Whether outputs are added to ``resolved_rate``, as `kinarm.policies.PPOConfig` says.
+        Whether outputs are added to ``resolved_rate``, as `kinarm.policies.PPOConfig` says, and
+        the sum is turned off bodies where ``proximity`` is seen.
     """
 
     mean: NDArray[np.float64]
@@ -138,6 +139,8 @@ class Policy:
         shape = (self.n_observations,) if given.ndim == 1 else (None, self.n_observations)
         x = finite_array("observations, as policy.observation has them,", given, shape)
         actions: NDArray[np.float64] = self._act(np, self.arrays, x)
+        if self.residual:
+            self.layout.turn_away(x, actions)
         return actions
 
     def _act(self, xp: Any, arrays: Any, observations: Any) -> Any:
@@ -174,8 +177,8 @@ class Policy:
     def _networks(self) -> Networks:
         first = Layer(*fold_normalizer(*self.layers[0], self.mean, self.std))
         batches = (Layer(weights[None], bias[None]) for weights, bias in (first, *self.layers[1:]))
-        first_rate = int(self.arrays["rates"][0]) if self.residual else -1
-        return Networks(tuple(batches), self.activations, self.mirror, first_rate)
+        firsts = (int(self.arrays.get(name, [-1])[0]) for name in ("rates", "near"))
+        return Networks(tuple(batches), self.activations, self.mirror, *firsts)
 
     @cached_property
     def arrays(self) -> dict[str, NDArray[Any]]:
@@ -184,7 +187,10 @@ class Policy:
         for number, layer in enumerate(self.layers):
             arrays |= {f"weights_{number}": layer.weights, f"bias_{number}": layer.bias}
         if self.residual:
-            arrays["rates"] = np.arange(self.layout.size)[self.layout.places["resolved_rate"]]
+            entries, places = np.arange(self.layout.size), self.layout.places
+            arrays["rates"] = entries[places["resolved_rate"]]
+            if "proximity" in places:
+                arrays["near"] = entries[places["proximity"]]
         if self.mirror is not None:
             arrays |= {f"mirror_{name}": getattr(self.mirror, name) for name in SIGNS}
         return arrays
@@ -257,6 +263,8 @@ class Policy:
 
     def to_torch(self) -> Any:
         """Make a module of PyTorch that maps observations to actions, in double precision."""
+        if "near" in self.arrays:
+            raise InvalidInputError("a residual policy that sees 'proximity' has no such module")
         from kinarm.policies.conversion.to_torch import module_of
 
         return module_of(self.arrays, self._act)

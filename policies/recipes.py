@@ -16,11 +16,12 @@ from kinarm.problem import PROBLEMS
 PER_TRAINING = ("problem", "seed")
 """Settings that vary between trainings with a recipe."""
 
-CONDITIONS = ("where_regions_differ", "where_more_is_asked")
+CONDITIONS = ("where_regions_differ", "where_more_is_asked", "where_scenes_differ")
 """Under which a recipe may have other settings.
 
 Several regions are to be reached that no reflection joins; or more is asked than points that stand
-and are seen where they are, among bodies that all episodes share and that rest.
+and are seen where they are, among bodies that all episodes share and that rest; or bodies rest, but
+are others in each episode.
 """
 
 RECIPE_REACH = 1.264
@@ -141,7 +142,8 @@ def _adapted(config: ConfigT, special: Mapping[tuple[str, str], Mapping[str, Any
     goal, scene = problem.task.goal, problem.scene
     unseen = problem.plant.range_of("goal_noise")[1] > 0
     more = unseen or goal.number or goal.changes or scene.moving or scene.random_bodies
-    held = (different_regions(problem, symmetric) > 1, more)
+    others = bool(scene.random_bodies) and not scene.moving
+    held = (different_regions(problem, symmetric) > 1, more, others)
     for condition in compress(CONDITIONS, held):
         config = replace(config, **special.get((config.recipe, condition), {}))
     scale = problem.task.tolerance / PROBLEMS["right"].task.tolerance

@@ -24,7 +24,7 @@ from kinarm.policies import Policy
 
 RECORD = Path(__file__).parents[2] / "data" / "results" / "skills" / "skills.json"
 
-JUDGED = ("ppo-best-disturbed", "ppo-best-arms", "ppo-best-poses")
+JUDGED = ("ppo-best-disturbed", "ppo-best-arms", "ppo-best-poses", "ppo-best-unseen")
 """Entries of the experiment beyond the paper's world."""
 
 TRIALS, SEED = 10_000, 3602

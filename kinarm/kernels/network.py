@@ -5,13 +5,17 @@ from numba import types
 from numpy.typing import NDArray
 
 from kinarm.episodes import ELU, HARDTANH, LEAKY_RELU, LINEAR, RELU, SILU, TANH, Control
-from kinarm.kernels.compiling import Array, Stage, call_stage, helper, inlined
+from kinarm.kernels.compiling import Array, Stage, call_stage, helper, inlined, lean_kernel
 from kinarm.kernels.elementary import hyperbolic_tangent
 from kinarm.kernels.lanes import as_numbers, select
 from kinarm.kernels.session import ACT, Session
 
 LEAK = 0.01
 """Slope of the leaky rectifier below zero."""
+
+KEPT, APPROACH, PASSES, LEAST_SQUARE = 0.005, 0.5, 10, 1e-9
+"""Distance that links keep from bodies [m], largest share of what is beyond it that a step takes,
+passes over all links, and what is added to the square of slopes."""
 
 
 @helper
@@ -112,6 +116,36 @@ def add_to_rates(seen: Array, rates: int, action: Array) -> None:
         action[0, axis] = seen[0, rates + axis] + longest * action[0, axis]
 
 
+@helper
+def keep_away(seen: Array, e: int, near: int, n_links: int, actions: Array) -> None:
+    """Clip an action of a row, and turn it off bodies that links come too near to.
+
+    Of what is beyond ``KEPT`` of a link's distance, a step takes ``APPROACH`` at most (Faverjon and
+    Tournassoud 1987). Each pass projects the action so for one link after the other. ``near`` is
+    the first entry of ``proximity`` in the observation.
+    """
+    n_joints, nothing = actions.shape[1], 0.0 * seen[e, near]
+    for number in range(PASSES + 1):
+        for link in range(n_links if number > 0 else 0):
+            first = near + (4 + n_joints) * link
+            along, square = nothing, nothing + LEAST_SQUARE
+            for k in range(n_joints):
+                slope = seen[e, first + 4 + k]
+                along, square = along + slope * actions[e, k], square + slope * slope
+            lack = max(APPROACH * (KEPT - seen[e, first]) - along, 0.0) / square
+            for k in range(n_joints):
+                actions[e, k] += lack * seen[e, first + 4 + k]
+        for k in range(n_joints):
+            actions[e, k] = min(max(actions[e, k], -1.0), 1.0)
+
+
+@lean_kernel
+def turn_away(seen: Array, near: int, n_links: int, actions: Array) -> None:
+    """Turn actions, shape (n, n_actuated), off bodies; see `keep_away`."""
+    for e in range(actions.shape[0]):
+        keep_away(seen, e, near, n_links, actions)
+
+
 @inlined
 def shared_policy(n_episodes: int, control: Control) -> int:
     """Policy of all episodes; -1 if there are several, 0 with a table."""
@@ -143,6 +177,8 @@ def _act(session: Session, shared: int) -> int:
     for axis in range(control.action_signs.shape[0]):
         action = block.action[0, axis]
         block.action[0, axis] = select(reflected, action * control.action_signs[axis], action)
+    if block.newton.shape[0] > 0 and control.near >= 0:
+        keep_away(block.observation, 0, control.near, block.q.shape[1], block.action)
     return 0
 
 

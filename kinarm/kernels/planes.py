@@ -40,6 +40,9 @@ CORNERS_TRIED = 24
 CLOSE = 1e-7
 """Precision of the distance [m]."""
 
+LEVEL = 0.02
+"""Rise of an axis above a half-space below which no end of it is the nearest [m]."""
+
 COARSE = 0.02
 """Precision of the distance of far bodies, as a share of it."""
 
@@ -168,7 +171,7 @@ def approach(shapes: ContactShapes, pair: int, poses: Array) -> tuple[float, Vec
         x, y, z = rotated_back(poses, frame, x, y, z)
     else:
         a, b = to_frame(poses, frame, a), to_frame(poses, frame, b)
-        x, y, z = from_box(a, b, *box_about(shapes, carrier, poses))
+        (x, y, z), _ = from_box(a, b, *box_about(shapes, carrier, poses))
     return radius - math.sqrt(x * x + y * y + z * z), (x, y, z)
 
 
@@ -201,8 +204,27 @@ def lay_plane(
 
 
 @inlined
-def from_box(a: Vector, b: Vector, lower: Vector, upper: Vector) -> Vector:
-    """Vector from a box to the segment ab, close to the shortest one."""
+def foot(shapes: ContactShapes, pair: int, poses: Array) -> Vector:
+    """Point of a mover's axis that is close to a body of the scene, in the world [m].
+
+    It moves as they do, without jumps.
+    """
+    carrier, mover = shapes.planes[pair, 0], shapes.planes[pair, 1]
+    frame = shapes.bodies[carrier, 2]
+    a, b = axis_in_world(shapes, mover, poses)
+    ux, uy, uz = b[0] - a[0], b[1] - a[1], b[2] - a[2]
+    if shapes.pairs[pair, 0] == WITH_HALFSPACE:
+        x, y, z, _ = surface(poses, frame)
+        share = min(max(0.5 - (x * ux + y * uy + z * uz) / (2.0 * LEVEL), 0.0), 1.0)
+    else:
+        box = box_about(shapes, carrier, poses)
+        share = from_box(to_frame(poses, frame, a), to_frame(poses, frame, b), *box)[1]
+    return a[0] + share * ux, a[1] + share * uy, a[2] + share * uz
+
+
+@inlined
+def from_box(a: Vector, b: Vector, lower: Vector, upper: Vector) -> tuple[Vector, float]:
+    """Vector from a box to the segment ab, close to the shortest one, and where it ends there."""
     ux, uy, uz = b[0] - a[0], b[1] - a[1], b[2] - a[2]
     length = ux * ux + uy * uy + uz * uz + 1e-12
     x, y, z = a[0] + 0.5 * ux, a[1] + 0.5 * uy, a[2] + 0.5 * uz
@@ -213,7 +235,7 @@ def from_box(a: Vector, b: Vector, lower: Vector, upper: Vector) -> Vector:
         t = ((cx - a[0]) * ux + (cy - a[1]) * uy + (cz - a[2]) * uz) / length
         t = min(max(t, 0.0), 1.0)
         x, y, z = a[0] + t * ux, a[1] + t * uy, a[2] + t * uz
-    return x - cx, y - cy, z - cz
+    return (x - cx, y - cy, z - cz), t
 
 
 @inlined

@@ -6,9 +6,16 @@ It depends on the configuration and the bodies alone, not on the planes that pro
 from typing import NamedTuple
 
 from kinarm.kernels.compiling import Array, Vector, helper
-from kinarm.kernels.kinematics import rotated, rotated_back
-from kinarm.kernels.lanes import select
-from kinarm.kernels.planes import FINE, height_above, is_placed, propose
+from kinarm.kernels.kinematics import point_jacobian, rotated, rotated_back
+from kinarm.kernels.lanes import any_lane, select
+from kinarm.kernels.planes import (
+    FINE,
+    ball_gap,
+    foot,
+    height_above,
+    is_placed,
+    propose,
+)
 from kinarm.kernels.session import Session
 
 NEAR = 0.5
@@ -48,32 +55,41 @@ class Seen(NamedTuple):
 def write_proximity(session: Session, seen: Seen, start: int, count: int) -> None:
     """Height of each link above the plane that separates it from the nearest body, and its normal.
 
-    The planes are those that `propose` finds. So heights are lower bounds of distances.
+    Then follows what the largest step of each actuated joint adds to it. The planes are those that
+    `propose` finds. So heights are lower bounds of distances.
     """
     shapes, block, poses = session.shapes, session.block, seen.poses
-    n_pairs, nothing = shapes.planes.shape[0], 0.0 * poses[0, 13]
+    limit, jacobian, planes = session.rules.step_limit, block.jacobian, block.planes
+    row, nothing = shapes.planes.shape[0], 0.0 * poses[0, 13]
     for link in range(1, count + 1):
         least, x, y, z = nothing + NEAR, nothing, nothing, nothing
-        for pair in range(n_pairs):
-            carrier, mover = shapes.planes[pair, 0], shapes.planes[pair, 1]
-            placed = is_placed(shapes, shapes.bodies[carrier, 2], poses)
-            if placed and shapes.bodies[mover, 2] == link:
-                propose(shapes, pair, poses, block.planes, n_pairs)
-                height = height_above(shapes, pair, FINE, poses, block.planes, n_pairs)
-                a, b, c = (
-                    block.planes[n_pairs, 0],
-                    block.planes[n_pairs, 1],
-                    block.planes[n_pairs, 2],
-                )
-                a, b, c = rotated(poses, shapes.planes[pair, 4], a, b, c)
-                nearer = height < least
+        px, py, pz = nothing, nothing, nothing
+        for pair in range(row):
+            frame = shapes.bodies[shapes.planes[pair, 0], 2]
+            if shapes.bodies[shapes.planes[pair, 1], 2] != link:
+                continue
+            if not is_placed(shapes, frame, poses):
+                continue
+            within = ball_gap(shapes, pair, poses) < least
+            if any_lane(within):
+                propose(shapes, pair, poses, planes, row)
+                height = height_above(shapes, pair, FINE, poses, planes, row)
+                normal = planes[row, 0], planes[row, 1], planes[row, 2]
+                a, b, c = rotated(poses, shapes.planes[pair, 4], *normal)
+                u, v, w = foot(shapes, pair, poses)
+                nearer = within & (height < least)
                 least = select(nearer, height, least)
                 x, y, z = select(nearer, a, x), select(nearer, b, y), select(nearer, c, z)
-        row = start + 4 * (link - 1)
-        block.observation[0, row] = max(least, 0.0)
-        block.observation[0, row + 1] = x
-        block.observation[0, row + 2] = y
-        block.observation[0, row + 3] = z
+                px, py, pz = select(nearer, u, px), select(nearer, v, py), select(nearer, w, pz)
+        place = start + (4 + limit.shape[0]) * (link - 1)
+        block.observation[0, place] = max(least, 0.0)
+        block.observation[0, place + 1] = x
+        block.observation[0, place + 2] = y
+        block.observation[0, place + 3] = z
+        point_jacobian(session.chain, poses, (px, py, pz), jacobian)
+        for k in range(limit.shape[0]):
+            slope = x * jacobian[0, k] + y * jacobian[1, k] + z * jacobian[2, k]
+            block.observation[0, place + 4 + k] = slope * limit[k] if k < link else nothing
 
 
 @helper

@@ -131,6 +131,8 @@ class TrainingArms:
         episodes = self.episodes
         replaced = episodes.interventions.copy()
         actions = self._reflected("actions", actions, episodes.observation)
+        if self.config.residual:
+            self.simulator.world.layout.turn_away(episodes.observation, actions)
         result = self.simulator.step(episodes, actions)
         rewards = result.reward.copy()
         if len(replaced):

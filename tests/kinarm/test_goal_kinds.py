@@ -94,6 +94,29 @@ def test_the_reference_agrees_with_a_plant(kind):
     compare_with_reference(simulator_of({**KINDS[kind], "sequence": 2}, **settings))
 
 
+def test_configurations_are_those_to_which_the_straight_way_is_freest():
+    """Of the first four that are found at a goal, by Coal's verdict on more points of each way."""
+    simulator = simulator_of({"kind": "configuration", "rotation_tolerance": 10.0})
+    world, shares = simulator.world, np.arange(1, 61)[:, None] / 60
+
+    def touching(start, end):
+        return world.in_contact(start + shares * (end - start)).mean()
+
+    starts, goals = simulator.sample(np.random.default_rng(3), 30)
+    open_goals = goals.copy()
+    open_goals[:, 3:] = np.nan
+    q, owner = world.configurations_at(open_goals, 4, 64)
+    free = ~world.in_contact(q)
+    chosen = np.array([touching(*pair) for pair in zip(starts, goals[:, 3:], strict=True)])
+    others = np.array(
+        [touching(starts[e], end) for end, e in zip(q[free], owner[free], strict=True)]
+    )
+    least = np.full(30, np.inf)
+    np.minimum.at(least, owner[free], others)
+    assert (chosen <= least + 0.1).all()
+    assert chosen.mean() < others.mean()
+
+
 def test_goals_reached_before_count():
     simulator = simulator_of({"kind": "direction", "sequence": 3})
     scenarios = simulator.sample(np.random.default_rng(1), 2)

@@ -125,7 +125,7 @@ class TestProximity:
         world, model = simulator.world, simulator.arm.model
         q = random_configurations(simulator, 5, 120)
         q = q[~world.in_contact(q)]
-        seen = world.observe(q, np.zeros((len(q), 3))).reshape(len(q), -1, 4)
+        seen = world.observe(q, np.zeros((len(q), 3))).reshape(len(q), simulator.arm.n_joints, -1)
         geometry, of_arm = world.contact_model.geometry, simulator.arm.geometry.ngeoms
         data, links = geometry.createData(), [g.parentJoint for g in geometry.geometryObjects]
         gaps = []
@@ -141,16 +141,34 @@ class TestProximity:
             assert (seen[k, :, 0] <= nearest + 1e-9).all()
         assert np.median(gaps) < 1e-3
         assert np.quantile(gaps, 0.9) < 0.02
-        norms = np.linalg.norm(seen[..., 1:], axis=-1)
+        norms = np.linalg.norm(seen[..., 1:4], axis=-1)
         np.testing.assert_allclose(norms, seen[..., 0] < NEAR, rtol=0, atol=1e-9)
+        assert not seen[seen[..., 0] == NEAR][:, 1:].any()
 
     def test_points_away_from_the_body(self):
         ball = Body(name="ball", shape="sphere", size=(0.1,), position=(0.625, 0.0, 1.0))
         scene = replace(Scene(), obstacles=(ball,), ground=False)
         simulator = simulator_of(("proximity",), scene=scene)
-        *_, hand = simulator.world.observe(np.zeros((1, 6)), np.zeros((1, 3))).reshape(-1, 4)
+        *_, hand = simulator.world.observe(np.zeros((1, 6)), np.zeros((1, 3))).reshape(6, -1)
         assert 0 < hand[0] < 0.2
         assert hand[3] < -0.9  # down, from the ball above the hand
+
+    def test_slopes_are_what_joints_add_to_distances(self):
+        """Distances of links from a ball, before and after small moves."""
+        ball = Body(name="ball", shape="sphere", size=(0.1,), position=(0.5, 0.1, 0.8))
+        scene = replace(Scene(), obstacles=(ball,), ground=False)
+        simulator = simulator_of(("proximity",), scene=scene)
+        q = random_configurations(simulator, 6, 40)[:40]
+        seen = simulator.world.observe(q, np.zeros((40, 3))).reshape(40, 6, 9)
+        limit, share = simulator.world.rules.step_limit, 1e-4
+        for joint in range(5):
+            moved = q.copy()
+            moved[:, joint] += share * limit[joint]
+            there = simulator.world.observe(moved, np.zeros((40, 3))).reshape(40, 6, 9)
+            near = (seen[..., 0] > 0) & (seen[..., 0] < NEAR) & (there[..., 0] < NEAR)
+            assert near.sum() > 40
+            added = (there[..., 0] - seen[..., 0])[near] / share
+            assert np.quantile(np.abs(added - seen[..., 4 + joint][near]), 0.9) < 2e-3
 
 
 class TestObstacles:

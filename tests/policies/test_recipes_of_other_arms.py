@@ -129,6 +129,15 @@ def test_where_more_is_asked(asked):
     assert harder.reward.collision == -5.0
 
 
+def test_where_scenes_differ():
+    """Bodies that move ask for more, but not for this."""
+    settings = {
+        name: recipe("ppo", "best", problem=name).learning_rate
+        for name in ("both", "crossing-paper", "obstacles-ur5", "obstacles-panda")
+    }
+    assert [*settings.values()] == [1e-3, 1e-3, 3e-4, 3e-4]
+
+
 @pytest.mark.parametrize("asked", [{"noise": 0.01}, {"goal": {"hold": 10}}], ids=str)
 def test_where_points_stand(asked):
     problem = PROBLEMS["both"].replace(**asked)

@@ -18,6 +18,7 @@ from kinarm.policies.ppo.learner import PPOTraining
 BOTH = ReachProblem.load("both")
 SHOWN = (*BOTH.observation.names("position"), "resolved_rate")
 PROBLEM = BOTH.replace(observation=SHOWN)
+NEAR = BOTH.replace(observation=(*SHOWN, "proximity"))
 RATES = slice(-5, None)
 N = 300
 
@@ -25,6 +26,38 @@ N = 300
 @pytest.fixture(scope="module")
 def simulator():
     return Simulator(PROBLEM, threads=1)
+
+
+@pytest.fixture(scope="module")
+def near():
+    return Simulator(NEAR, threads=1)
+
+
+def links_of(simulator, observations):
+    """Distances of links from bodies [m], and what joints add to them."""
+    seen = observations[:, simulator.world.layout.places["proximity"]]
+    links = seen.reshape(len(seen), simulator.arm.n_joints, -1)
+    return links[..., 0], links[..., 4:]
+
+
+def test_links_take_at_most_half_of_their_distance_from_bodies(near):
+    scenarios = near.sample(np.random.default_rng(5), 2000)
+    seen = near.world.observe(*scenarios)
+    before, slopes = links_of(near, seen)
+    wanted = np.random.default_rng(6).choice([-1.0, 1.0], (2000, near.n_actions))
+    turned, shares = wanted.copy(), []
+    near.world.layout.turn_away(seen, turned)
+    added = np.einsum("elk,ek->el", slopes, turned)
+    assert (added > 0.5 * (0.005 - before) - 1e-3).mean() > 0.99
+    kept = (np.einsum("elk,ek->el", slopes, wanted) >= 0.5 * (0.005 - before)).all(axis=1)
+    np.testing.assert_array_equal((turned == wanted).all(axis=1), kept)
+    for actions in (wanted, turned):
+        episodes = near.reset(*scenarios)
+        moved = ~near.step(episodes, actions).collision
+        after, _ = links_of(near, episodes.observation)
+        shares.append((after < 0.45 * before)[moved].mean())
+    assert shares[0] > 0.005
+    assert shares[1] < shares[0] / 3
 
 
 @pytest.mark.parametrize("mirrored", [False, True])
@@ -45,9 +78,11 @@ def test_the_nearer_the_goal_the_less_is_added(simulator, mirrored):
 
 
 @pytest.mark.parametrize("mirrored", [False, True])
-def test_kernels_act_as_policies_do(simulator, mirrored):
-    mirror = problem_mirror(PROBLEM) if mirrored else None
-    policy = replace(policy_for(PROBLEM, mirror=mirror), residual=True)
+@pytest.mark.parametrize("problem", [PROBLEM, NEAR], ids=["blind", "near"])
+def test_kernels_act_as_policies_do(request, problem, mirrored):
+    simulator = request.getfixturevalue("near" if problem is NEAR else "simulator")
+    mirror = problem_mirror(problem) if mirrored else None
+    policy = replace(policy_for(problem, mirror=mirror), residual=True)
     scenarios = simulator.sample(np.random.default_rng(2), N)
     compiled = simulator.rollout(policy, *scenarios, record=True)
     stepped = simulator.rollout(lambda seen: policy(seen), *scenarios, record=True)
@@ -69,13 +104,14 @@ def test_without_rates_there_is_nothing_to_add_to():
         replace(policy_for(BOTH), residual=True)
 
 
-def test_learners_show_the_rates_and_add_to_them():
+@pytest.mark.parametrize("problem", ["both", NEAR], ids=["blind", "near"])
+def test_learners_show_the_rates_and_add_to_them(problem):
     """Without noise, the arms of a training move as those of its policy."""
     config = PPOConfig(
-        problem="both", residual=True, n_envs=8, n_steps=5, batch_size=40, net_arch=(6,),
+        problem=problem, residual=True, n_envs=8, n_steps=5, batch_size=40, net_arch=(6,),
         iterations=1, log_std_init=-30.0, symmetric=True,
     )  # fmt: skip
-    assert config.problem.observation.parts == SHOWN
+    assert {*SHOWN}.issubset(config.problem.observation.parts)
     training = PPOTraining(config)
     state = training.initial_state()
     policy = state_policy(config, state)
