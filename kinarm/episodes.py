@@ -44,8 +44,9 @@ class Rules(NamedTuple):
     shown, width : ndarray of int, shape (n_parts, 2), and int
         First entry of each part of the observation of a step, and how often
         it is there; and entries of that observation.
-    newton : int
-        Errors of a goal that a Newton step of the observation is to remove.
+    newton, near : int
+        Errors of a goal that a Newton step of the observation is to remove, and
+        first entry of ``proximity``; -1 for none.
     boxes : ndarray, shape (n_placed, 2, 3)
         Middle and half-size of a box around each body of the scene, before its
         size.
@@ -66,6 +67,7 @@ class Rules(NamedTuple):
     shown: NDArray[np.uint32]
     width: int
     newton: int
+    near: int
     boxes: Array
     goal: Any
     shield: Array
@@ -96,8 +98,6 @@ class Control(NamedTuple):
     rates : int
         First entry of ``resolved_rate``, to which outputs of the networks are added as
         far as there is to go; -1 if outputs are the actions.
-    near : int
-        First entry of ``proximity``, by which sums are turned off bodies; -1 for none.
     actions : ndarray, shape (n_episodes, n_steps, n_actuated)
         The table; one step serves every step.
     """
@@ -110,7 +110,6 @@ class Control(NamedTuple):
     action_signs: Array = np.zeros(0)
     side: int = 0
     rates: int = -1
-    near: int = -1
     actions: Array = np.zeros((0, 0, 0))
 
 

@@ -88,15 +88,12 @@ class Networks:
         Reflection of goals on the left, and of actions; None for no reflection.
     rates : int
         First entry of ``resolved_rate``, to which outputs are added; -1 for none.
-    near : int
-        First entry of ``proximity``, by which the sums are turned off bodies; -1 for none.
     """
 
     layers: tuple[Layer, ...]
     activations: tuple[Activation, ...] = ()
     mirror: Mirror | None = None
     rates: int = -1
-    near: int = -1
 
     def __post_init__(self) -> None:
         if not self.layers:
@@ -217,7 +214,6 @@ def network_control(
         policy=index.astype(np.int64),
         activations=np.array([get_args(Activation).index(name) for name in networks.activations]),
         rates=networks.rates,
-        near=networks.near,
     )
     if networks.mirror is None:
         return control

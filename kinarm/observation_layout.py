@@ -100,7 +100,8 @@ class ObservationLayout(NamedTuple):
         newton = 0
         if {"resolved_rate", "proximity"} & self.places.keys():
             newton = 6 if turned else 3
-        return {"shown": self.shown, "width": self.width, "newton": newton}
+        near = self.places["proximity"].start if "proximity" in self.places else -1
+        return {"shown": self.shown, "width": self.width, "newton": newton, "near": near}
 
     @property
     def side(self) -> int | None:

@@ -177,8 +177,8 @@ class Policy:
     def _networks(self) -> Networks:
         first = Layer(*fold_normalizer(*self.layers[0], self.mean, self.std))
         batches = (Layer(weights[None], bias[None]) for weights, bias in (first, *self.layers[1:]))
-        firsts = (int(self.arrays.get(name, [-1])[0]) for name in ("rates", "near"))
-        return Networks(tuple(batches), self.activations, self.mirror, *firsts)
+        first_rate = int(self.arrays["rates"][0]) if self.residual else -1
+        return Networks(tuple(batches), self.activations, self.mirror, first_rate)
 
     @cached_property
     def arrays(self) -> dict[str, NDArray[Any]]:
@@ -187,10 +187,7 @@ class Policy:
         for number, layer in enumerate(self.layers):
             arrays |= {f"weights_{number}": layer.weights, f"bias_{number}": layer.bias}
         if self.residual:
-            entries, places = np.arange(self.layout.size), self.layout.places
-            arrays["rates"] = entries[places["resolved_rate"]]
-            if "proximity" in places:
-                arrays["near"] = entries[places["proximity"]]
+            arrays["rates"] = np.arange(self.layout.size)[self.layout.places["resolved_rate"]]
         if self.mirror is not None:
             arrays |= {f"mirror_{name}": getattr(self.mirror, name) for name in SIGNS}
         return arrays
@@ -263,7 +260,7 @@ class Policy:
 
     def to_torch(self) -> Any:
         """Make a module of PyTorch that maps observations to actions, in double precision."""
-        if "near" in self.arrays:
+        if self.residual and "proximity" in self.layout.places:
             raise InvalidInputError("a residual policy that sees 'proximity' has no such module")
         from kinarm.policies.conversion.to_torch import module_of
 

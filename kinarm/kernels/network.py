@@ -177,8 +177,8 @@ def _act(session: Session, shared: int) -> int:
     for axis in range(control.action_signs.shape[0]):
         action = block.action[0, axis]
         block.action[0, axis] = select(reflected, action * control.action_signs[axis], action)
-    if block.newton.shape[0] > 0 and control.near >= 0:
-        keep_away(block.observation, 0, control.near, block.q.shape[1], block.action)
+    if block.newton.shape[0] > 0 and control.rates >= 0 and session.rules.near >= 0:
+        keep_away(block.observation, 0, session.rules.near, block.q.shape[1], block.action)
     return 0
 
 

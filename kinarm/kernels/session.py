@@ -185,12 +185,12 @@ class Session(Record):
             The networks, and as for `kinarm.World.episodes`.
         """
         episodes = self.episodes
-        pairs = [*zip(self.control, control, strict=True)]
+        pairs = zip(self.control, control, strict=True)
         parts: list[Any] = [pair for pair in pairs if isinstance(pair[0], np.ndarray)]
         collected = 0 if shift is None else len(starts)
         if (
             episodes.q.shape != starts.shape
-            or any(own != other for own, other in pairs if isinstance(own, int))
+            or (self.control.side, self.control.rates) != (control.side, control.rates)
             or len(episodes.moments) != collected
             or any(own.shape != other.shape for own, other in parts)
         ):
