@@ -120,7 +120,7 @@ class Policy:
         """Length of an observation."""
         return len(self.mean)
 
-    @property
+    @cached_property
     def layout(self) -> ObservationLayout:
         """Where the parts of an observation are."""
         return ObservationLayout.filling(self.problem, self.n_observations, self.n_actions)

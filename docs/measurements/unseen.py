@@ -1,0 +1,58 @@
+"""What policies for a UR5 reach in MotionBenchMaker's problems, which they have never seen.
+
+``python -m docs.measurements.unseen FOLDER PROBLEMS`` prints a table. FOLDER is that of a study of
+``obstacles-ur5``, PROBLEMS that of the unpacked ``problems.tar.bz2`` that *Own scene* names. The
+arm has no gripper. The goal is where the tool is at the wanted configuration, which policies are
+told, within the tolerance of their own problem.
+"""
+
+import sys
+from collections import defaultdict
+from pathlib import Path
+
+import numpy as np
+
+from kinarm import Mount, Simulator
+from kinarm.evaluation import Study
+from kinarm.evaluation.report.templating import markdown_table
+from kinarm.evaluation.statistics import share_over_seeds
+from kinarm.moveit import import_problem
+from kinarm.policies import Policy
+
+HEADER = ("problems", "reached %", "contact %", "behind a shield: reached %", "contact %")
+"""The first column names a set and its number of problems."""
+
+
+def main(folder: Path, policies: list[Policy]) -> None:
+    """Run each policy once from each start, bare and behind a shield."""
+    sets = defaultdict[str, list[list[tuple[bool, ...]]]](list)
+    own = policies[0].problem
+    regions, unchecked = own.scene.goal_regions, {"reachable_goals": False}
+    for file in sorted(folder.glob("*/scene*.yaml")):
+        request = file.with_name(file.name.replace("scene", "request"))
+        found, ends = import_problem(file, request, own.arm, Mount())
+        scene = type(own.scene)(
+            obstacles=found.scene.obstacles, ground=found.scene.ground, goal_regions=regions
+        )
+        bare = Simulator(own.replace(scene=scene, **unchecked), threads=1)
+        goal, came = bare.world.reached(ends[1:]), list[tuple[bool, ...]]()
+        for policy in policies:
+            pair = [each.rollout(policy, ends[:1], goal) for each in (bare, bare.shielded())]
+            came.append(tuple(bool(x[0]) for did in pair for x in (did.success, did.collision)))
+        sets[file.parent.name].append(came)
+    rows = []
+    everything = [each for members in sets.values() for each in members]
+    for name, members in {**sets, "all": everything}.items():
+        shares = []
+        for hits in np.array(members).transpose(2, 1, 0):
+            share = share_over_seeds(hits)
+            low, high = (100 * end for end in share.ci95)
+            shares.append(f"{100 * share.value:.1f} ({low:.1f}..{high:.1f})")
+        rows.append([f"`{name}`, {len(members)}", *shares])
+    print(markdown_table(HEADER, rows))
+
+
+if __name__ == "__main__":
+    study = Study.load(Path(sys.argv[1]))
+    runs = [run for run in study.finished if run.config.problem.name == "obstacles-ur5"]
+    main(Path(sys.argv[2]), [study.policy(run) for run in runs])
