@@ -96,7 +96,7 @@ class TestRefusals:
     def test_policy_that_sees_bodies(self, run, tmp_path):
         problem = ReachProblem.load("right").replace(observation=["goal", "proximity"])
         torch = pytest.importorskip("torch")
-        linear = torch.nn.Linear(3 + 6 * 4, 5)
+        linear = torch.nn.Linear(3 + 6 * 9, 5)
         Policy.from_torch(linear, problem).save(tmp_path / "mine.npz")
         answer = run("kinarm-export", tmp_path / "mine.npz", "--out", tmp_path / "out")
         check_refused(answer, "the policy sees proximity")
