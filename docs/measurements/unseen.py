@@ -8,19 +8,32 @@ told, within the tolerance of their own problem.
 
 import sys
 from collections import defaultdict
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
-from kinarm import Mount, Simulator
+from kinarm import Body, Mount, Simulator
+from kinarm.chain import quaternion_of
 from kinarm.evaluation import Study
 from kinarm.evaluation.report.templating import markdown_table
 from kinarm.evaluation.statistics import share_over_seeds
 from kinarm.moveit import import_problem
 from kinarm.policies import Policy
 
+BASE = Mount(position=(0.0, 0.0, 0.9144), rpy=(0.0, 0.0, 1.57))
+"""Where the arm stands in the scenes, by the URDF that they come with."""
+
 HEADER = ("problems", "reached %", "contact %", "behind a shield: reached %", "contact %")
 """The first column names a set and its number of problems."""
+
+
+def seen_from_base(body: Body) -> Body:
+    """A body of a scene in the frame of the arm's base, where policies have theirs."""
+    back = BASE.rotation.T
+    place, turned = back @ np.subtract(body.position, BASE.position), back @ body.rotation
+    quaternion = tuple(quaternion_of(turned).tolist())
+    return replace(body, position=tuple(place.tolist()), rpy=(0, 0, 0), quaternion=quaternion)
 
 
 def main(folder: Path, policies: list[Policy]) -> None:
@@ -32,7 +45,9 @@ def main(folder: Path, policies: list[Policy]) -> None:
         request = file.with_name(file.name.replace("scene", "request"))
         found, ends = import_problem(file, request, own.arm, Mount())
         scene = type(own.scene)(
-            obstacles=found.scene.obstacles, ground=found.scene.ground, goal_regions=regions
+            obstacles=tuple(map(seen_from_base, found.scene.obstacles)),
+            ground=False,
+            goal_regions=regions,
         )
         bare = Simulator(own.replace(scene=scene, **unchecked), threads=1)
         goal, came = bare.world.reached(ends[1:]), list[tuple[bool, ...]]()
