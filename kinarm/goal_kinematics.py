@@ -170,7 +170,7 @@ class GoalKinematics(InverseKinematics):
         filled, found = goals.copy(), np.zeros(len(goals), dtype=bool)
         unknown = np.isnan(goals[:, 3:]).sum(axis=1) > 0
         pending, least = np.arange(len(goals)), np.full(len(goals), STRAIGHT + 1)
-        nearest = starts is not None and self.problem.task.goal.kind == "configuration"
+        configurations = self.problem.task.goal.kind == "configuration"
         for most, seeds in SOLUTIONS:
             if not len(pending):
                 break
@@ -180,7 +180,7 @@ class GoalKinematics(InverseKinematics):
             free = self.free(q, there)[1]
             pending = np.setdiff1d(owner, owner[free])
             q, owner, there = q[free], owner[free], there[free] if len(there) else there
-            if starts is not None and nearest:
+            if configurations and starts is not None:
                 touching, time = self._straight_ways(starts[owner], q, there)
                 order = np.lexsort((time, touching, owner))
                 rows, first = np.unique(owner[order], return_index=True)

@@ -67,8 +67,11 @@ class ObservationLayout(NamedTuple):
 
     def length(self, part: Part) -> int:
         """Number of entries of a part in the observation of a step."""
-        slopes = self.counts[ACTUATED] if part.sloped else 0
-        return (len(part.signs) + slopes) * self.counts[part.of]
+        return (len(part.signs) + self.slopes(part)) * self.counts[part.of]
+
+    def slopes(self, part: Part) -> int:
+        """Number of entries of actuated joints that each of a part is followed by."""
+        return self.counts[ACTUATED] if part.sloped else 0
 
     @property
     def width(self) -> int:
@@ -97,10 +100,11 @@ class ObservationLayout(NamedTuple):
     def rules(self, problem: ReachProblem) -> dict[str, Any]:
         """What `kinarm.episodes.Rules` have of it."""
         turned = problem.task.goal.kind in ("direction", "pose")
-        newton = 0
-        if {"resolved_rate", "proximity"} & self.places.keys():
+        newton, near, places = 0, -1, self.places
+        if {"resolved_rate", "proximity"} & places.keys():
             newton = 6 if turned else 3
-        near = self.places["proximity"].start if "proximity" in self.places else -1
+        if "proximity" in places:
+            near = places["proximity"].start
         return {"shown": self.shown, "width": self.width, "newton": newton, "near": near}
 
     @property
@@ -183,7 +187,7 @@ class ObservationLayout(NamedTuple):
         for part in self.parts:
             rows = np.tile(np.array(part.signs, dtype=np.float64), (self.counts[part.of], 1))
             of_joint = axes[: len(rows), None] if 0 in part.signs else 1.0
-            slopes = np.tile(axes[: self.counts[ACTUATED] if part.sloped else 0], (len(rows), 1))
+            slopes = np.tile(axes[: self.slopes(part)], (len(rows), 1))
             signs.append(np.hstack([np.where(rows == 0, of_joint, rows), slopes]).ravel())
         return np.tile(np.concatenate(signs), self.history)
 

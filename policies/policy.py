@@ -125,6 +125,11 @@ class Policy:
         """Where the parts of an observation are."""
         return ObservationLayout.filling(self.problem, self.n_observations, self.n_actions)
 
+    @cached_property
+    def _turns_away(self) -> bool:
+        """Whether it turns actions off bodies."""
+        return self.residual and "proximity" in self.layout.places
+
     @property
     def n_actions(self) -> int:
         """Length of an action."""
@@ -139,7 +144,7 @@ class Policy:
         shape = (self.n_observations,) if given.ndim == 1 else (None, self.n_observations)
         x = finite_array("observations, as policy.observation has them,", given, shape)
         actions: NDArray[np.float64] = self._act(np, self.arrays, x)
-        if self.residual:
+        if self._turns_away:
             self.layout.turn_away(x, actions)
         return actions
 
@@ -260,7 +265,7 @@ class Policy:
 
     def to_torch(self) -> Any:
         """Make a module of PyTorch that maps observations to actions, in double precision."""
-        if self.residual and "proximity" in self.layout.places:
+        if self._turns_away:
             raise InvalidInputError("a residual policy that sees 'proximity' has no such module")
         from kinarm.policies.conversion.to_torch import module_of
 

@@ -95,9 +95,16 @@ def problems_of(
     with tempfile.TemporaryDirectory() as place:
         with tarfile.open(folder / "problems.tar.bz2") as archive:
             archive.extractall(place, filter="data")
-        for scene in sorted(Path(place, "problems").glob("*/scene*.yaml")):
-            request = scene.with_name(scene.name.replace("scene", "request"))
-            yield scene.parent.name, *import_problem(scene, request, arm, Mount())
+        yield from problems_in(Path(place, "problems"), arm)
+
+
+def problems_in(
+    folder: Path, arm: ArmSpecification
+) -> Iterator[tuple[str, ReachProblem, NDArray[np.float64]]]:
+    """The same, of the folder that ``problems.tar.bz2`` holds."""
+    for scene in sorted(folder.glob("*/scene*.yaml")):
+        request = scene.with_name(scene.name.replace("scene", "request"))
+        yield scene.parent.name, *import_problem(scene, request, arm, Mount())
 
 
 def main(folder: Path) -> None:

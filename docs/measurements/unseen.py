@@ -13,12 +13,12 @@ from pathlib import Path
 
 import numpy as np
 
-from kinarm import Body, Mount, Simulator
+from docs.measurements.motionbenchmaker import problems_in
+from kinarm import Body, Mount, Scene, Simulator
 from kinarm.chain import quaternion_of
-from kinarm.evaluation import Study
+from kinarm.evaluation import METRICS, Study
 from kinarm.evaluation.report.templating import markdown_table
 from kinarm.evaluation.statistics import share_over_seeds
-from kinarm.moveit import import_problem
 from kinarm.policies import Policy
 
 BASE = Mount(position=(0.0, 0.0, 0.9144), rpy=(0.0, 0.0, 1.57))
@@ -40,29 +40,25 @@ def main(folder: Path, policies: list[Policy]) -> None:
     """Run each policy once from each start, bare and behind a shield."""
     sets = defaultdict[str, list[list[tuple[bool, ...]]]](list)
     own = policies[0].problem
-    regions, unchecked = own.scene.goal_regions, {"reachable_goals": False}
-    for file in sorted(folder.glob("*/scene*.yaml")):
-        request = file.with_name(file.name.replace("scene", "request"))
-        found, ends = import_problem(file, request, own.arm, Mount())
-        scene = type(own.scene)(
+    for name, found, ends in problems_in(folder, own.arm):
+        scene = Scene(
             obstacles=tuple(map(seen_from_base, found.scene.obstacles)),
             ground=False,
-            goal_regions=regions,
+            goal_regions=own.scene.goal_regions,
         )
-        bare = Simulator(own.replace(scene=scene, **unchecked), threads=1)
+        bare = Simulator(own.replace(scene=scene, reachable_goals=False), threads=1)
         goal, came = bare.world.reached(ends[1:]), list[tuple[bool, ...]]()
         for policy in policies:
             pair = [each.rollout(policy, ends[:1], goal) for each in (bare, bare.shielded())]
             came.append(tuple(bool(x[0]) for did in pair for x in (did.success, did.collision)))
-        sets[file.parent.name].append(came)
-    rows = []
+        sets[name].append(came)
+    rows, reached = [], METRICS["success"]
     everything = [each for members in sets.values() for each in members]
     for name, members in {**sets, "all": everything}.items():
         shares = []
         for hits in np.array(members).transpose(2, 1, 0):
             share = share_over_seeds(hits)
-            low, high = (100 * end for end in share.ci95)
-            shares.append(f"{100 * share.value:.1f} ({low:.1f}..{high:.1f})")
+            shares.append(f"{reached.write(share.value)} ({reached.write_range(*share.ci95)})")
         rows.append([f"`{name}`, {len(members)}", *shares])
     print(markdown_table(HEADER, rows))
 
