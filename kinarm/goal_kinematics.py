@@ -22,9 +22,6 @@ from kinarm.problem import ReachProblem
 SOLUTIONS = ((4, 64), (16, 1024), (64, 1024))
 """Configurations at a goal that are tried in turn, and the seeds that look for them, at most."""
 
-STRAIGHT = 12
-"""Points at which the straight way to a configuration is looked at."""
-
 SAMPLE = 64
 """Goals that show whether an arm reaches any."""
 
@@ -151,7 +148,7 @@ class GoalKinematics(InverseKinematics):
         return solutions.configurations, solutions.owner
 
     def solved_goals(
-        self, goals: Array, choices: Array, scenes: Array, starts: Array | None = None
+        self, goals: Array, choices: Array, scenes: Array
     ) -> tuple[NDArray[np.bool_], Array]:
         """Which goals have a configuration without contact; and goals with its rests.
 
@@ -163,14 +160,10 @@ class GoalKinematics(InverseKinematics):
             Numbers in [0, 1) that choose it.
         scenes : ndarray
             As of `kinarm.World.scenes_of`.
-        starts : ndarray, shape (n, n_joints), optional
-            If goals are configurations, the one is chosen whose straight way from here touches
-            least, or takes least time.
         """
         filled, found = goals.copy(), np.zeros(len(goals), dtype=bool)
         unknown = np.isnan(goals[:, 3:]).sum(axis=1) > 0
-        pending, least = np.arange(len(goals)), np.full(len(goals), STRAIGHT + 1)
-        configurations = self.problem.task.goal.kind == "configuration"
+        pending = np.arange(len(goals))
         for most, seeds in SOLUTIONS:
             if not len(pending):
                 break
@@ -180,36 +173,12 @@ class GoalKinematics(InverseKinematics):
             free = self.free(q, there)[1]
             pending = np.setdiff1d(owner, owner[free])
             q, owner, there = q[free], owner[free], there[free] if len(there) else there
-            if configurations and starts is not None:
-                touching, time = self._straight_ways(starts[owner], q, there)
-                order = np.lexsort((time, touching, owner))
-                rows, first = np.unique(owner[order], return_index=True)
-                chosen = order[first]
-                better = touching[chosen] < least[rows]
-                rows, chosen = rows[better], chosen[better]
-                least[rows] = touching[chosen]
-                pending = np.flatnonzero(least > 0)
-            else:
-                rows, first, counts = np.unique(owner, return_index=True, return_counts=True)
-                chosen = first + (choices[rows] * counts).astype(np.int64)
+            rows, first, counts = np.unique(owner, return_index=True, return_counts=True)
+            chosen = first + (choices[rows] * counts).astype(np.int64)
             found[rows] = True
             wanted = unknown[rows]
             filled[rows[wanted], 3:] = self.reached(q[chosen[wanted]])[:, 3:]
         return found, filled
-
-    def _straight_ways(
-        self, starts: Array, ends: Array, scenes: Array
-    ) -> tuple[NDArray[np.int64], Array]:
-        """Of ``STRAIGHT`` points between configurations, how many touch; and how long they take.
-
-        Configurations have the shape (n, n_joints) [rad or m]; times are in steps.
-        """
-        shares = np.arange(1, STRAIGHT + 1) / STRAIGHT
-        ways = starts[:, None] + shares[:, None] * (ends - starts)[:, None]
-        there = np.repeat(scenes, STRAIGHT, axis=0) if len(scenes) else scenes
-        free, limit = self.free(ways.reshape(-1, ends.shape[1]), there)[1], self.rules.step_limit
-        time = (np.abs(ends - starts)[:, : len(limit)] / limit).max(axis=1)
-        return (~free.reshape(-1, STRAIGHT)).sum(axis=1), time
 
     @cached_property
     def reachable_of_sample(self) -> int:

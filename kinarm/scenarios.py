@@ -9,6 +9,7 @@ from kinarm.episode_scenes import bits_of
 from kinarm.errors import ProblemError, whole_number
 from kinarm.goal_kinematics import SAMPLE
 from kinarm.kernels.compiling import Array
+from kinarm.ways import solved_by_ways
 from kinarm.world import World
 
 START_ATTEMPTS = 2000
@@ -56,6 +57,7 @@ def draw_for_each(
     lower = (arm.home + spread * (arm.lower - arm.home))[:n_actions]
     extent = (spread * (arm.upper - arm.lower))[:n_actions]
     width, solved = world.goals.n_uniforms, task.reachable_goals or world.goals.solved
+    by_ways = task.goal.kind == "configuration" and not task.goal.configurations
     drawn = _draw(rngs, [count] * len(rngs), width)
     goals = world.goals.at(drawn)
     if task.goal.number and not world.reachable_of_sample:
@@ -82,8 +84,10 @@ def draw_for_each(
             missed = ~rejected
             tried = pending[missed]
             there = scenes[missed] if len(scenes) else scenes
-            asked = aims[missed], drawn[tried, -1], there, proposed[missed]
-            found, goals[tried] = world.solved_goals(*asked)
+            if by_ways:
+                found, goals[tried] = solved_by_ways(world, aims[missed], proposed[missed], there)
+            else:
+                found, goals[tried] = world.solved_goals(aims[missed], drawn[tried, -1], there)
             missed[missed] = ~found
             rows = pending[missed]
             wanted = np.bincount(rows // max(count, 1), minlength=len(rngs)).tolist()

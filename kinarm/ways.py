@@ -1,0 +1,126 @@
+"""Which configuration at a goal the arm is to take: one that control without a network reaches."""
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kinarm._parallel import run_together
+from kinarm.episodes import LINEAR, SUCCESS, Control
+from kinarm.kernels.compiling import Array
+from kinarm.kernels.rollout import advance, begin
+from kinarm.plant import Plant
+from kinarm.world import World
+
+CANDIDATES = ((16, 256), (256, 4096))
+"""Configurations at a goal that are tried in turn, and the seeds that look for them, at most."""
+
+STRAIGHT = 12
+"""Points at which the straight way to a configuration is looked at."""
+
+TRIES = 32
+"""Of these, how many are tried: those first to which the straight way touches least."""
+
+PACE = 2
+"""Steps of an episode in one that is tried."""
+
+
+def solved_by_ways(
+    world: World, goals: Array, starts: Array, scenes: Array
+) -> tuple[NDArray[np.bool_], Array]:
+    """Which goals have a configuration without contact; and goals with such configurations.
+
+    Of up to 256, the first that control reaches (see `reached_by_control`) is taken, those first to
+    which the straight way touches least, and then those that take least time. If control reaches
+    none, it is the first of all.
+
+    Parameters
+    ----------
+    world : World
+        The world of the problem.
+    goals, starts, scenes : ndarray
+        Goals, shape (n, goal_width), starts, shape (n, n_joints) [rad or m], and the scenes of
+        `kinarm.World.scenes_of`.
+    """
+    filled, found, ahead = goals.copy(), np.zeros(len(goals), dtype=bool), _ahead(world)
+    pending = np.arange(len(goals))
+    for most, seeds in CANDIDATES:
+        if not len(pending):
+            break
+        q, owner = world.configurations_at(goals[pending], most, seeds)
+        owner = pending[owner]
+        pending = np.unique(owner)
+        free = world.free(q, _of(scenes, owner))[1]
+        q, owner = q[free], owner[free]
+        touching, time = _straight_ways(world, starts[owner], q, _of(scenes, owner))
+        order = np.lexsort((time, touching, owner))
+        q, owner = q[order], owner[order]
+        rows, first, counts = np.unique(owner, return_index=True, return_counts=True)
+        found[rows], filled[rows, 3:] = True, q[first]
+        tried = np.arange(len(rows))
+        for turn in range(TRIES):
+            tried = tried[turn < counts[tried]]
+            aims, those = rows[tried], first[tried] + turn
+            wanted = filled[aims]
+            wanted[:, 3:] = q[those]
+            reached = reached_by_control(ahead, starts[aims], wanted, _of(scenes, aims))
+            filled[aims[reached]] = wanted[reached]
+            pending, tried = np.setdiff1d(pending, aims[reached]), tried[~reached]
+    return found, filled
+
+
+def reached_by_control(
+    world: World, starts: Array, goals: Array, scenes: Array
+) -> NDArray[np.bool_]:
+    """Which goals control without a network is proven to reach, shape (n,).
+
+    That is resolved-rate control, turned off bodies if they are seen. Where observations do not
+    tell of its rates, it is straight motion. Takes starts, goals and scenes as `solved_by_ways`.
+    """
+    rates = world.layout.places.get("resolved_rate")
+    if rates is None:
+        return _straight_ways(world, starts, goals[:, 3:], scenes)[0] == 0
+    n, widths = len(starts), (world.n_observations, world.n_actions)
+    control = Control(
+        layers=np.array(widths),
+        weights=np.zeros((1, (widths[0] + 1) * widths[1])),
+        policy=np.zeros(n, dtype=np.int64),
+        activations=np.array([LINEAR]),
+        rates=rates.start,
+    )
+    episodes = world.episodes(starts, goals)
+    if len(scenes):
+        episodes.scenes[:] = scenes
+    session = world.session(control, episodes)
+    run_together(begin, n, world.threads, session.of_thread, np.arange(n))
+    run_together(advance, n * world.rules.horizon, world.threads, session.of_thread)
+    return episodes.status == SUCCESS
+
+
+def _ahead(world: World) -> World:
+    """The world in which ways are tried: joints obey, steps are longer, and nothing is replaced."""
+    task, stepping = world.problem.task, world.problem.stepping
+    return world.changed(
+        plant=Plant(),
+        stepping=replace(stepping, time_step=PACE * stepping.time_step, shield=False),
+        task=replace(task, horizon=-(-task.horizon // PACE)),
+    )
+
+
+def _of(scenes: Array, rows: NDArray[np.int64]) -> Array:
+    """Scenes of some rows, if each has its own."""
+    return scenes[rows] if len(scenes) else scenes
+
+
+def _straight_ways(
+    world: World, starts: Array, ends: Array, scenes: Array
+) -> tuple[NDArray[np.int64], Array]:
+    """Of ``STRAIGHT`` points between configurations, how many touch; and how long they take.
+
+    Configurations have the shape (n, n_joints) [rad or m]; times are in steps.
+    """
+    touching, limit = np.zeros(len(starts), dtype=np.int64), world.rules.step_limit
+    for point in range(1, STRAIGHT + 1):
+        q = starts + point / STRAIGHT * (ends - starts)
+        touching += ~world.free(q, scenes)[1]
+    return touching, (np.abs(ends - starts)[:, : len(limit)] / limit).max(axis=1)
