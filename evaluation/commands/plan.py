@@ -14,6 +14,9 @@ from kinarm.problem_options import ProblemOptions
 
 SUFFIXES = (".csv", ".json", ".html")
 
+OF_EPISODES = ("task", "plant", "feedback", "shield", "tolerance", "horizon", "start_spread")
+"""Options of a problem that a plan does not depend on."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class PlanRequest(PlanSettings, ProblemOptions):
@@ -71,5 +74,5 @@ def _plan(request: PlanRequest, _: str) -> None:
         print(f"written: {path}")
 
 
-main = partial(run_request, "kinarm-plan", PlanRequest, _plan)
+main = partial(run_request, "kinarm-plan", PlanRequest, _plan, skip=OF_EPISODES)
 """Run the command line."""

@@ -94,27 +94,40 @@ def test_the_reference_agrees_with_a_plant(kind):
     compare_with_reference(simulator_of({**KINDS[kind], "sequence": 2}, **settings))
 
 
-def test_configurations_are_those_to_which_the_straight_way_is_freest():
-    """Of the first four that are found at a goal, by Coal's verdict on more points of each way."""
-    simulator = simulator_of({"kind": "configuration", "rotation_tolerance": 10.0})
-    world, shares = simulator.world, np.arange(1, 61)[:, None] / 60
+@pytest.mark.parametrize("parts", [(), ("resolved_rate", "proximity")], ids=["blind", "near"])
+def test_configurations_are_those_that_control_reaches(parts):
+    """If it reaches any of the first, alone in Python; else they touch least on the straight way."""
+    goal, shown = {"kind": "configuration", "rotation_tolerance": 10.0}, Observation()
+    seen = [*shown.names("configuration"), *parts]
+    simulator = simulator_of(goal, observation=seen, tolerance=0.02, time_step=0.05)
+    world, layout = simulator.world, simulator.world.layout
+
+    def control(observations):
+        to_go = observations[:, layout.places["joints_error"]][:, : world.n_actions]
+        ways = to_go / world.rules.step_limit / 2
+        actions = ways / np.maximum(np.abs(ways).max(axis=1, keepdims=True), 1.0)
+        layout.turn_away(observations, actions)
+        return actions
 
     def touching(start, end):
-        return world.in_contact(start + shares * (end - start)).mean()
+        return world.in_contact(start + np.arange(1, 13)[:, None] / 12 * (end - start)).sum()
 
-    starts, goals = simulator.sample(np.random.default_rng(3), 30)
+    starts, goals = simulator.sample(np.random.default_rng(3), 100)
+    hurried = simulator.changed(time_step=0.1, horizon=HORIZON // 2)
+    reached = hurried.rollout(control, starts, goals).success
     open_goals = goals.copy()
     open_goals[:, 3:] = np.nan
-    q, owner = world.configurations_at(open_goals, 4, 64)
-    free = ~world.in_contact(q)
-    chosen = np.array([touching(*pair) for pair in zip(starts, goals[:, 3:], strict=True)])
-    others = np.array(
-        [touching(starts[e], end) for end, e in zip(q[free], owner[free], strict=True)]
-    )
-    least = np.full(30, np.inf)
-    np.minimum.at(least, owner[free], others)
-    assert (chosen <= least + 0.1).all()
-    assert chosen.mean() < others.mean()
+    q, owner = world.configurations_at(open_goals, 16, 256)
+    q, owner = q[free := ~world.in_contact(q)], owner[free]
+    candidates = np.hstack([goals[owner, :3], q])
+    others = hurried.rollout(control, starts[owner], candidates).success
+    any_reached = np.zeros(len(goals), dtype=bool)
+    np.logical_or.at(any_reached, owner, others)
+    assert 0.3 < others.mean() < 0.9
+    assert reached[any_reached].mean() > 0.97
+    for e in np.flatnonzero(~reached & ~any_reached):
+        least = min(touching(starts[e], end) for end in q[owner == e])
+        assert touching(starts[e], goals[e, 3:]) <= least
 
 
 def test_goals_reached_before_count():
