@@ -18,8 +18,8 @@ CANDIDATES = ((16, 256), (256, 4096))
 STRAIGHT = 12
 """Points at which the straight way to a configuration is looked at."""
 
-TRIES = 32
-"""Of these, how many are tried: those first to which the straight way touches least."""
+TRIED = (1, 8, 32)
+"""How many of these control tries at most, in lots: those first to which that way is freest."""
 
 PACE = 2
 """Steps of an episode in one that is tried."""
@@ -57,15 +57,16 @@ def solved_by_ways(
         q, owner = q[order], owner[order]
         rows, first, counts = np.unique(owner, return_index=True, return_counts=True)
         found[rows], filled[rows, 3:] = True, q[first]
-        tried = np.arange(len(rows))
-        for turn in range(TRIES):
-            tried = tried[turn < counts[tried]]
-            aims, those = rows[tried], first[tried] + turn
-            wanted = filled[aims]
-            wanted[:, 3:] = q[those]
+        place = np.arange(len(owner)) - np.repeat(first, counts)
+        for last in TRIED:
+            tried = np.flatnonzero((place < last) & np.isin(owner, pending))
+            place[tried] = TRIED[-1]
+            aims = owner[tried]
+            wanted = np.concatenate([goals[aims, :3], q[tried]], axis=1)
             reached = reached_by_control(ahead, starts[aims], wanted, _of(scenes, aims))
-            filled[aims[reached]] = wanted[reached]
-            pending, tried = np.setdiff1d(pending, aims[reached]), tried[~reached]
+            arrived, nearest = np.unique(aims[reached], return_index=True)
+            filled[arrived] = wanted[reached][nearest]
+            pending = np.setdiff1d(pending, arrived)
     return found, filled
 
 
