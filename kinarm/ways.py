@@ -12,14 +12,14 @@ from kinarm.kernels.rollout import advance, begin
 from kinarm.plant import Plant
 from kinarm.world import World
 
-CANDIDATES = ((16, 256), (256, 4096))
+CANDIDATES = ((16, 256), (96, 1024), (384, 4096))
 """Configurations at a goal that are tried in turn, and the seeds that look for them, at most."""
 
 STRAIGHT = 12
 """Points at which the straight way to a configuration is looked at."""
 
-TRIED = (1, 8, 32)
-"""How many of these control tries at most, in lots: those first to which that way is freest."""
+LOTS = (1, 8, 384)
+"""How many of these control has tried after each lot."""
 
 PACE = 2
 """Steps of an episode in one that is tried."""
@@ -30,7 +30,7 @@ def solved_by_ways(
 ) -> tuple[NDArray[np.bool_], Array]:
     """Which goals have a configuration without contact; and goals with such configurations.
 
-    Of up to 256, the first that control reaches (see `reached_by_control`) is taken, those first to
+    Of up to 384, the first that control reaches (see `reached_by_control`) is taken, those first to
     which the straight way touches least, and then those that take least time. If control reaches
     none, it is the first of all.
 
@@ -58,9 +58,9 @@ def solved_by_ways(
         rows, first, counts = np.unique(owner, return_index=True, return_counts=True)
         found[rows], filled[rows, 3:] = True, q[first]
         place = np.arange(len(owner)) - np.repeat(first, counts)
-        for last in TRIED:
+        for last in LOTS:
             tried = np.flatnonzero((place < last) & np.isin(owner, pending))
-            place[tried] = TRIED[-1]
+            place[tried] = LOTS[-1]
             aims = owner[tried]
             wanted = np.concatenate([goals[aims, :3], q[tried]], axis=1)
             reached = reached_by_control(ahead, starts[aims], wanted, _of(scenes, aims))
