@@ -2,8 +2,8 @@
 
 ``python -m docs.measurements.unseen FOLDER PROBLEMS`` prints a table. FOLDER is that of a study of
 ``obstacles-ur5``, PROBLEMS that of the unpacked ``problems.tar.bz2`` that *Own scene* names. The
-arm has no gripper. The goal is where the tool is at the wanted configuration, which policies are
-told, within the tolerance of their own problem.
+arm has no gripper. The goal is the position of the tool at the wanted configuration, within the
+tolerance of their own problem; configurations there are chosen as in that.
 """
 
 import sys
@@ -20,6 +20,7 @@ from kinarm.evaluation import METRICS, Study
 from kinarm.evaluation.report.templating import markdown_table
 from kinarm.evaluation.statistics import share_over_seeds
 from kinarm.policies import Policy
+from kinarm.ways import solved_by_ways
 
 BASE = Mount(position=(0.0, 0.0, 0.9144), rpy=(0.0, 0.0, 1.57))
 """Where the arm stands in the scenes, by the URDF that they come with."""
@@ -48,6 +49,8 @@ def main(folder: Path, policies: list[Policy]) -> None:
         )
         bare = Simulator(own.replace(scene=scene, reachable_goals=False), threads=1)
         goal, came = bare.world.reached(ends[1:]), list[tuple[bool, ...]]()
+        goal[:, 3:] = np.nan
+        goal = solved_by_ways(bare.world, goal, ends[:1], bare.world.scenes_of(ends[:1], goal))[1]
         for policy in policies:
             pair = [each.rollout(policy, ends[:1], goal) for each in (bare, bare.shielded())]
             came.append(tuple(bool(x[0]) for did in pair for x in (did.success, did.collision)))
