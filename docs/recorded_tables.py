@@ -249,12 +249,12 @@ def skills_table() -> str:
             worst = min(share for share, _ in row["seeds"].values())
             shown += [_success_of(row), f"{100 * worst:.1f}", f"{100 * row['collision']:.2f}"]
         ratio = "" if behind["step_ratio"] is None else f"{behind['step_ratio']:.2f}"
-        oracle = f"{100 * behind['oracle']:.1f}"
-        end = [oracle, ratio, f"{behind['speed']:.2f}", f"{behind['minutes']:.1f}"]
+        alone, oracle = (f"{100 * behind[name]:.1f}" for name in ("control", "oracle"))
+        end = [alone, oracle, ratio, f"{behind['speed']:.2f}", f"{behind['minutes']:.1f}"]
         rows.append([f"`{problem}`", str(len(bare["seeds"])), *shown, *end])
     three = ["worst seed %", "contact %"]
     heads = ["problem", "seeds", "bare: success %", *three, "behind a shield: success %", *three]
-    heads += ["oracle %", "step ratio", "speed at the goal m/s", "minutes of a core"]
+    heads += ["control alone %", "oracle %", "step ratio", "speed at the goal m/s", "minutes of a core"]
     return markdown_table(heads, rows)
 
 

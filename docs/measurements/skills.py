@@ -13,9 +13,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from docs.leaderboard import rows_of
-from kinarm import Simulator
+from kinarm import ReachProblem, Simulator
 from kinarm._files import write_text
 from kinarm.evaluation import EvaluationRequest, Experiment, Study
 from kinarm.evaluation.contestants import ORACLE
@@ -48,12 +49,27 @@ def judged(policies: Mapping[str, Policy]) -> list[dict[str, Any]]:
     rows = rows_of([each for each in faced if each is not oracle])
     shared = {
         "oracle": float(oracle.rollouts.success.mean()),
+        "control": control_alone(oracle.problem),
         "speed": speed_at_goal([*policies.values()]),
     }
     for row in rows:
         del row["failures"]
         row |= shared
     return rows
+
+
+def control_alone(problem: ReachProblem) -> float:
+    """Share that resolved-rate control reaches behind a shield: what networks add to."""
+    shown = (*problem.observation.names(problem.task.goal.kind), "resolved_rate")
+    simulator = Simulator(problem.replace(observation=[*dict.fromkeys(shown)])).shielded()
+    trials, layout = TrialSet.draw(simulator, TRIALS, SEED), simulator.world.layout
+
+    def act(observations: NDArray[np.float64]) -> NDArray[np.float64]:
+        actions = observations[:, layout.places["resolved_rate"]].copy()
+        layout.turn_away(observations, actions)
+        return actions
+
+    return float(simulator.rollout(act, trials.starts, trials.goals).success.mean())
 
 
 def speed_at_goal(policies: list[Policy]) -> float:

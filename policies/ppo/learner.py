@@ -32,7 +32,7 @@ NORMALIZED_OVER = 10_000
 """Random starts whose observations the normaliser describes."""
 
 RANDOM_STEPS = 8
-"""Random steps before observations that tell of earlier ones."""
+"""Random steps before observations that tell of earlier ones, at any time if they tell it."""
 
 PARTS = 8
 """Parts of a minibatch whose gradients are found independently."""
@@ -89,7 +89,10 @@ class PPOTraining:
             scenarios = elsewhere.sample(rng, NORMALIZED_OVER)
         if not simulator.world.layout.remembers:
             return simulator.world.observe(*scenarios)
-        episodes = simulator.reset(*scenarios)
+        latest = simulator.task.horizon - RANDOM_STEPS
+        timed = latest > 0 and "time_left" in simulator.world.layout.places
+        taken = rng.integers(latest, size=NORMALIZED_OVER) if timed else 0
+        episodes = simulator.reset(*scenarios, taken=taken)
         for _ in range(RANDOM_STEPS):
             simulator.step(episodes, rng.uniform(-1, 1, (NORMALIZED_OVER, simulator.n_actions)))
         return episodes.observation
