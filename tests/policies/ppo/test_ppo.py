@@ -229,6 +229,15 @@ def test_a_policy_sees_its_joints_wherever_episodes_start(changes):
     np.testing.assert_array_equal(same > 1e-6, usual > 1e-6)
 
 
+def test_inputs_at_any_time_of_an_episode_are_of_the_order_of_one():
+    """The time was many deviations off when statistics came from its beginning alone."""
+    seen = [*TINY.problem.observation.names("position"), "time_left"]
+    config = replace(TINY, problem=TINY.problem.replace(observation=seen))
+    statistics = PPOTraining(config, threads=1).initial_state().normalizer
+    for time in (0.0, 1.0):
+        assert abs(time - statistics.mean[-1]) / statistics.std[-1] < 3
+
+
 def test_policy_acts_like_the_actor(trained):
     config, _, states = trained
     training, state = PPOTraining(config), replace(states[-1], parameters=states[-1].parameters * 1)
