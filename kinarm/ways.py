@@ -24,6 +24,9 @@ LOTS = (1, 8, 384)
 PACE = 2
 """Steps of an episode in one that is tried."""
 
+AT_ONCE = 512
+"""Goals at once: each may take a few megabytes."""
+
 
 def solved_by_ways(
     world: World, goals: Array, starts: Array, scenes: Array
@@ -43,31 +46,39 @@ def solved_by_ways(
         `kinarm.World.scenes_of`.
     """
     filled, found, ahead = goals.copy(), np.zeros(len(goals), dtype=bool), _ahead(world)
-    pending = np.arange(len(goals))
-    for most, seeds in CANDIDATES:
-        if not len(pending):
-            break
-        q, owner = world.configurations_at(goals[pending], most, seeds)
-        owner = pending[owner]
-        pending = np.unique(owner)
-        free = world.free(q, _of(scenes, owner))[1]
-        q, owner = q[free], owner[free]
-        touching, time = _straight_ways(world, starts[owner], q, _of(scenes, owner))
-        order = np.lexsort((time, touching, owner))
-        q, owner = q[order], owner[order]
-        rows, first, counts = np.unique(owner, return_index=True, return_counts=True)
-        found[rows], filled[rows, 3:] = True, q[first]
-        place = np.arange(len(owner)) - np.repeat(first, counts)
-        for last in LOTS:
-            tried = np.flatnonzero((place < last) & np.isin(owner, pending))
-            place[tried] = LOTS[-1]
-            aims = owner[tried]
-            wanted = np.concatenate([goals[aims, :3], q[tried]], axis=1)
-            reached = reached_by_control(ahead, starts[aims], wanted, _of(scenes, aims))
-            arrived, nearest = np.unique(aims[reached], return_index=True)
-            filled[arrived] = wanted[reached][nearest]
-            pending = np.setdiff1d(pending, arrived)
+    for start in range(0, len(goals), AT_ONCE):
+        pending = np.arange(start, min(start + AT_ONCE, len(goals)))
+        for most, seeds in CANDIDATES:
+            if not len(pending):
+                break
+            q, owner = world.configurations_at(goals[pending], most, seeds)
+            owner = pending[owner]
+            pending = np.unique(owner)
+            q, owner = _in_turn(world, q, owner, starts, scenes)
+            rows, first, counts = np.unique(owner, return_index=True, return_counts=True)
+            found[rows], filled[rows, 3:] = True, q[first]
+            place = np.arange(len(owner)) - np.repeat(first, counts)
+            for last in LOTS:
+                tried = np.flatnonzero((place < last) & np.isin(owner, pending))
+                place[tried] = LOTS[-1]
+                aims = owner[tried]
+                wanted = np.concatenate([goals[aims, :3], q[tried]], axis=1)
+                reached = reached_by_control(ahead, starts[aims], wanted, _of(scenes, aims))
+                arrived, nearest = np.unique(aims[reached], return_index=True)
+                filled[arrived] = wanted[reached][nearest]
+                pending = np.setdiff1d(pending, arrived)
     return found, filled
+
+
+def _in_turn(
+    world: World, q: Array, owner: NDArray[np.int64], starts: Array, scenes: Array
+) -> tuple[Array, NDArray[np.int64]]:
+    """Free configurations and their goals, those of a goal in the order in which they are tried."""
+    free = world.free(q, _of(scenes, owner))[1]
+    q, owner = q[free], owner[free]
+    touching, time = _straight_ways(world, starts[owner], q, _of(scenes, owner))
+    order = np.lexsort((time, touching, owner))
+    return q[order], owner[order]
 
 
 def reached_by_control(
