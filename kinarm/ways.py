@@ -91,7 +91,7 @@ def reached_by_control(
     """
     rates = world.layout.places.get("resolved_rate")
     if rates is None:
-        return _straight_ways(world, starts, goals[:, 3:], scenes)[0] == 0
+        return np.equal(_straight_ways(world, starts, goals[:, 3:], scenes)[0], 0)
     n, widths = len(starts), (world.n_observations, world.n_actions)
     control = Control(
         layers=np.array(widths),
@@ -106,7 +106,7 @@ def reached_by_control(
     session = world.session(control, episodes)
     run_together(begin, n, world.threads, session.of_thread, np.arange(n))
     run_together(advance, n * world.rules.horizon, world.threads, session.of_thread)
-    return episodes.status == SUCCESS
+    return np.equal(episodes.status, SUCCESS)
 
 
 def _ahead(world: World) -> World:
