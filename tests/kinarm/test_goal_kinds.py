@@ -96,7 +96,7 @@ def test_the_reference_agrees_with_a_plant(kind):
 
 @pytest.mark.parametrize("parts", [(), ("resolved_rate", "proximity")], ids=["blind", "near"])
 def test_configurations_are_those_that_control_reaches(parts):
-    """If it reaches any of the first, alone in Python; else they touch least on the straight way."""
+    """If it reaches any of the first, alone in Python; else the straight way to it is freest."""
     goal, shown = {"kind": "configuration", "rotation_tolerance": 10.0}, Observation()
     seen = [*shown.names("configuration"), *parts]
     simulator = simulator_of(goal, observation=seen, tolerance=0.02, time_step=0.05)
