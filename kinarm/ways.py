@@ -1,6 +1,7 @@
 """Which configuration at a goal the arm is to take: one that control without a network reaches."""
 
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,8 +19,8 @@ CANDIDATES = ((16, 256), (96, 1024), (384, 4096))
 STRAIGHT = 12
 """Points at which the straight way to a configuration is looked at."""
 
-LOTS = (1, 8, 384)
-"""How many of these control has tried after each lot."""
+LOTS = (1, 8)
+"""How many of these control has tried after each lot but the last, which has all others."""
 
 PACE = 2
 """Steps of an episode in one that is tried."""
@@ -58,9 +59,9 @@ def solved_by_ways(
             rows, first, counts = np.unique(owner, return_index=True, return_counts=True)
             found[rows], filled[rows, 3:] = True, q[first]
             place = np.arange(len(owner)) - np.repeat(first, counts)
-            for last in LOTS:
-                tried = np.flatnonzero((place < last) & np.isin(owner, pending))
-                place[tried] = LOTS[-1]
+            for begun, end in pairwise((0, *LOTS, most)):
+                lot = (place >= begun) & (place < end)
+                tried = np.flatnonzero(lot & np.isin(owner, pending))
                 aims = owner[tried]
                 wanted = np.concatenate([goals[aims, :3], q[tried]], axis=1)
                 reached = reached_by_control(ahead, starts[aims], wanted, _of(scenes, aims))
