@@ -16,6 +16,11 @@ from kinarm.scene import Scene
 from kinarm.scene_draws import SceneDraws
 
 
+def scenes_at(scenes: Array, rows: NDArray[np.int64] | NDArray[np.bool_]) -> Array:
+    """Scenes of some episodes; as they are, empty, if all have the same."""
+    return scenes[rows] if len(scenes) else scenes
+
+
 def bits_of(starts: Array, goals: Array) -> NDArray[np.uint64]:
     """Bits of goals and starts, shape (n, goal_width + n_joints): they decide what is drawn."""
     return (np.concatenate([goals, starts], axis=1) + 0.0).view(np.uint64)

@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 from kinarm.bodies import rotation_matrix, rotation_of_quaternion
 from kinarm.chain import quaternion_of
 from kinarm.collision import ContactModel
+from kinarm.episode_scenes import scenes_at
 from kinarm.episodes import Pursuit, Rules
 from kinarm.errors import LARGEST, InvalidInputError, ProblemError, finite_array
 from kinarm.goals import Goals, unit
@@ -169,10 +170,9 @@ class GoalKinematics(InverseKinematics):
                 break
             q, owner = self.configurations_at(goals[pending], most, seeds)
             owner = pending[owner]
-            there = scenes[owner] if len(scenes) else scenes
-            free = self.free(q, there)[1]
+            free = self.free(q, scenes_at(scenes, owner))[1]
             pending = np.setdiff1d(owner, owner[free])
-            q, owner, there = q[free], owner[free], there[free] if len(there) else there
+            q, owner = q[free], owner[free]
             rows, first, counts = np.unique(owner, return_index=True, return_counts=True)
             chosen = first + (choices[rows] * counts).astype(np.int64)
             found[rows] = True

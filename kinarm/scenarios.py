@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from kinarm.episode_scenes import bits_of
+from kinarm.episode_scenes import bits_of, scenes_at
 from kinarm.errors import ProblemError, whole_number
 from kinarm.goal_kinematics import SAMPLE
 from kinarm.kernels.compiling import Array
@@ -83,7 +83,7 @@ def draw_for_each(
         if solved:
             missed = ~rejected
             tried = pending[missed]
-            there = scenes[missed] if len(scenes) else scenes
+            there = scenes_at(scenes, missed)
             if by_ways:
                 found, goals[tried] = solved_by_ways(world, aims[missed], proposed[missed], there)
             else:
@@ -134,7 +134,7 @@ def draw_followers(world: World, starts: Array, goals: Array) -> Array:
         uniforms = _draw(rngs, pending.sum(axis=1).tolist(), world.goals.n_uniforms)
         found, aims = np.ones(len(owner), dtype=bool), world.goals.at(uniforms)
         if task.reachable_goals or world.goals.solved:
-            there = scenes[owner] if len(scenes) else scenes
+            there = scenes_at(scenes, owner)
             found, aims = world.solved_goals(aims, uniforms[:, -1], there)
         drawn[pending] = aims
         pending[pending] = ~found

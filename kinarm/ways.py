@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kinarm._parallel import run_together
+from kinarm.episode_scenes import scenes_at
 from kinarm.episodes import LINEAR, SUCCESS, Control
 from kinarm.kernels.compiling import Array
 from kinarm.kernels.rollout import advance, begin
@@ -64,7 +65,7 @@ def solved_by_ways(
                 tried = np.flatnonzero(lot & np.isin(owner, pending))
                 aims = owner[tried]
                 wanted = np.concatenate([goals[aims, :3], q[tried]], axis=1)
-                reached = reached_by_control(ahead, starts[aims], wanted, _of(scenes, aims))
+                reached = reached_by_control(ahead, starts[aims], wanted, scenes_at(scenes, aims))
                 arrived, nearest = np.unique(aims[reached], return_index=True)
                 filled[arrived] = wanted[reached][nearest]
                 pending = np.setdiff1d(pending, arrived)
@@ -75,9 +76,9 @@ def _in_turn(
     world: World, q: Array, owner: NDArray[np.int64], starts: Array, scenes: Array
 ) -> tuple[Array, NDArray[np.int64]]:
     """Free configurations and their goals, those of a goal in the order in which they are tried."""
-    free = world.free(q, _of(scenes, owner))[1]
+    free = world.free(q, scenes_at(scenes, owner))[1]
     q, owner = q[free], owner[free]
-    touching, time = _straight_ways(world, starts[owner], q, _of(scenes, owner))
+    touching, time = _straight_ways(world, starts[owner], q, scenes_at(scenes, owner))
     order = np.lexsort((time, touching, owner))
     return q[order], owner[order]
 
@@ -118,11 +119,6 @@ def _ahead(world: World) -> World:
         stepping=replace(stepping, time_step=PACE * stepping.time_step, shield=False),
         task=replace(task, horizon=-(-task.horizon // PACE)),
     )
-
-
-def _of(scenes: Array, rows: NDArray[np.int64]) -> Array:
-    """Scenes of some rows, if each has its own."""
-    return scenes[rows] if len(scenes) else scenes
 
 
 def _straight_ways(
