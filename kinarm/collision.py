@@ -18,7 +18,6 @@ from kinarm.arm import Arm
 from kinarm.contact_pairs import (
     body_names,
     candidate_pairs,
-    close_pairs,
     make_verdicts_reliable,
     start_anew,
     uninformative_pairs,
@@ -151,7 +150,7 @@ class ContactModel:
             arm=arm,
             geometry=geometry,
             body_names=names,
-            shapes=ContactShapes.build(arm, scene, kept, n_shapes, close_pairs(arm, geometry)),
+            shapes=ContactShapes.build(arm, scene, kept, n_shapes),
             left_out={
                 (names[first], names[second]): dropped[index]
                 for index, (first, second) in enumerate(candidates)

@@ -13,9 +13,6 @@ from numpy.typing import NDArray
 from kinarm.arm import Arm
 from kinarm.errors import ProblemError
 
-CLOSE, OFTEN, CLOSENESS_SAMPLES = 0.025, 0.1, 200
-"""Close pairs are nearer than this [m] in more than this share of these samples."""
-
 GUESS, HINT = np.array([1.0, 0.0, 0.0]), np.zeros(2, dtype=np.int32)
 """Starts of Coal's searches: direction between shapes, and numbers of corners."""
 
@@ -153,24 +150,3 @@ def random_configurations(arm: Arm, count: int, seed: int = 0) -> NDArray[np.flo
     uniforms = np.random.default_rng(seed).random((count, arm.n_actuated))
     q[:, moved] = arm.lower[moved] + uniforms * (arm.upper - arm.lower)[moved]
     return q
-
-
-def close_pairs(arm: Arm, geometry: pin.GeometryModel) -> set[int]:
-    """Pairs with a mesh that often are less than `CLOSE` apart."""
-    objects = geometry.geometryObjects
-    meshes = [isinstance(shape.geometry, coal.ConvexBase) for shape in objects]
-    pairs = [
-        index
-        for index, pair in enumerate(geometry.collisionPairs)
-        if meshes[pair.first] or meshes[pair.second]
-    ]
-    if not pairs:
-        return set()
-    data, distances = arm.model.createData(), geometry.createData()
-    often = dict.fromkeys(pairs, 0)
-    for q in random_configurations(arm, CLOSENESS_SAMPLES):
-        pin.updateGeometryPlacements(arm.model, data, geometry, distances, q)
-        for index in pairs:
-            result = pin.computeDistance(geometry, distances, index)
-            often[index] += result.min_distance < CLOSE
-    return {index for index in pairs if often[index] > OFTEN * CLOSENESS_SAMPLES}

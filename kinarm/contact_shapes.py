@@ -1,6 +1,6 @@
 """Flat arrays of polytopes and capsules around what may touch, for proofs."""
 
-from collections.abc import Collection, Sequence
+from collections.abc import Sequence
 from itertools import product
 from typing import NamedTuple
 
@@ -13,13 +13,13 @@ from kinarm.arm import Arm
 from kinarm.bodies import Body
 from kinarm.chain import Chain, point_speed
 from kinarm.enclosures import (
-    FEW,
     MANY,
     SOME,
     Enclosure,
     around,
     enclosing_polytope,
     inner_capsule,
+    outer_capsule,
     prism,
 )
 from kinarm.kernels.compiling import Array
@@ -37,7 +37,7 @@ class ContactShapes(NamedTuple):
     """Shapes, pairs and motion bounds as flat arrays.
 
     A *body* is a rounded polytope: about each shape of the arm, then of the
-    scene; last come closer and fine ones about shapes whose first is coarse. Each
+    scene; last come fine ones about shapes whose first is coarse. Each
     lies in a frame, of which there is a row in ``poses``: frame 0 is the world, k
     the k-th joint, and further ones are those of the scene's bodies. Such a row
     (`placed`) has a size and a rounding instead of a quaternion: the body's
@@ -49,6 +49,9 @@ class ContactShapes(NamedTuple):
         Capsule that is or lies in a shape: end points (3 + 3) in its frame,
         radius [m]. For the scene's bodies before the size, and with a radius of
         minus infinity unless they are exact.
+    around : ndarray, shape (n_own, 7)
+        Capsule around each of the arm's shapes: middle and half of its axis
+        (3 + 3) in its frame, radius [m].
     pairs : ndarray of int, shape (n_pairs, 3)
         Kind, index of a moving shape of the arm, and index of the other shape.
     travel : ndarray, shape (n_joints, n_pairs)
@@ -89,6 +92,7 @@ class ContactShapes(NamedTuple):
     """
 
     capsules: Array
+    around: Array
     pairs: NDArray[np.int64]
     travel: Array
     exact: NDArray[np.bool_]
@@ -112,7 +116,6 @@ class ContactShapes(NamedTuple):
         scene: Scene,
         pairs: list[tuple[int, int]],
         n_shapes: int,
-        close: Collection[int],
     ) -> "ContactShapes":
         """Flatten the shapes of an arm in a scene.
 
@@ -124,12 +127,10 @@ class ContactShapes(NamedTuple):
             Shapes of each pair; the scene's bodies count from ``n_shapes``.
         n_shapes : int
             The arm's shapes.
-        close : collection of int
-            Pairs that often are too close for coarse polytopes.
         """
         objects = list(arm.geometry.geometryObjects)
         surroundings = [unit_body(body) for body in scene.bodies]
-        bodies, links, (closer, finer) = _enclosed(objects, surroundings, arm.n_joints)
+        bodies, links, finer = _enclosed(objects, surroundings, arm.n_joints)
         ends = np.cumsum([0, *(len(body.corners) for body in bodies)])
         blocks = list(map(corner_blocks, bodies, ends))
         edges, frames = np.cumsum([0, *map(len, blocks)]), np.array(links, dtype=np.int64)
@@ -146,9 +147,7 @@ class ContactShapes(NamedTuple):
             if kind == WITH_HALFSPACE and _keeps_height(arm.chain, scene.bodies[second - n_shapes]):
                 base = 1
             last = min(links[mover], arm.n_actuated)
-            fine = finer[carrier], finer[mover]
-            usual = (closer[carrier], closer[mover]) if column in close else (carrier, mover)
-            proxies.append((usual, fine))
+            proxies.append(((carrier, mover), (finer[carrier], finer[mover])))
             planes.append((carrier, mover, base, last, frame))
             for axis in range(base, links[mover]):
                 # The fine polytope has all corners of the coarse one.
@@ -165,10 +164,13 @@ class ContactShapes(NamedTuple):
         inner = map(inner_capsule, objects)
         capsules = [np.append(each.corners, each.rounding) for each in inner]
         capsules += [np.append(AXIS, 0.0 if each.exact else -np.inf) for each in surroundings]
+        outer = ((*each.corners[[0, -1]], each.rounding) for each in map(outer_capsule, objects))
+        around = [(*(a + b) / 2, *(b - a) / 2, radius) for a, b, radius in outer]
         exact = [isinstance(each.geometry, coal.Capsule | coal.Sphere) for each in objects]
         exact += [each.exact for each in surroundings]
         return cls(
             capsules=np.array(capsules, dtype=np.float64).reshape(-1, 7),
+            around=np.array(around, dtype=np.float64).reshape(-1, 7),
             pairs=np.array(rows, dtype=np.int64).reshape(-1, 3),
             travel=travel,
             exact=np.array(exact, dtype=bool),
@@ -268,22 +270,18 @@ def placed_row(body: Body, unit: UnitBody) -> Array:
 
 def _enclosed(
     objects: list[pin.GeometryObject], surroundings: list[UnitBody], n_joints: int
-) -> tuple[list[Enclosure], list[int], list[list[int]]]:
-    """Bodies of shapes of arm and scene, their frames, and which bodies are closer, and fine."""
-    bodies = [enclosing_polytope(shape, FEW) for shape in objects]
+) -> tuple[list[Enclosure], list[int], list[int]]:
+    """Bodies of shapes of arm and scene, their frames, and which bodies are fine."""
+    bodies = [enclosing_polytope(shape, SOME) for shape in objects]
     bodies += [Enclosure(each.corners, 0.0, each.excess) for each in surroundings]
-    links = [shape.parentJoint for shape in objects]
+    links, fine = [shape.parentJoint for shape in objects], list(range(len(bodies)))
     links += range(n_joints + 1, n_joints + 1 + len(surroundings))
-    levels = []
-    for most in (SOME, MANY):
-        level = list(range(len(objects) + len(surroundings)))
-        for index, shape in enumerate(objects):
-            if len(bodies[index].corners) == FEW:
-                level[index] = len(bodies)
-                bodies.append(enclosing_polytope(shape, most))
-                links.append(links[index])
-        levels.append(level)
-    return bodies, links, levels
+    for index, shape in enumerate(objects):
+        if len(bodies[index].corners) == SOME:
+            fine[index] = len(bodies)
+            bodies.append(enclosing_polytope(shape))
+            links.append(links[index])
+    return bodies, links, fine
 
 
 def _keeps_height(chain: Chain, body: Body) -> bool:

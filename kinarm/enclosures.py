@@ -14,14 +14,17 @@ from kinarm.kernels.distance import distances_from_hull
 ENCLOSURES = 1
 """To be raised when the same points get another enclosure."""
 
-FEW, SOME, MANY = 16, 64, 256
-"""Corners of a coarse, a closer and a fine polytope about a mesh."""
+SOME, MANY = 40, 256
+"""Corners of a coarse and a fine polytope about a mesh."""
 
 CLOSE_ENOUGH = 1e-4
 """Widening below which no more corners are taken [m]."""
 
 INNER = 1
 """To be raised when the same points get another capsule inside."""
+
+OUTER, CIRCLE_STEPS = 1, 2000
+"""To be raised when the same points get another capsule around; steps of its search."""
 
 SIDES = 32
 """Sides of the prism about a cylinder."""
@@ -103,6 +106,15 @@ def _fitted(points: Array, most: int) -> dict[str, Any]:
         chosen.append(farthest)
 
 
+def outer_capsule(shape: pin.GeometryObject) -> Enclosure:
+    """Slim capsule around a shape, in its joint's frame; equal to a capsule or sphere."""
+    (corners, radius, _), excess = enclosing_polytope(shape), 0.0
+    if len(corners) > 2:
+        fitted = cached_arrays("outer", OUTER, corners.tobytes(), lambda: _capsule_about(corners))
+        corners, radius, excess = fitted["corners"], radius + float(fitted["radius"]), np.inf
+    return Enclosure(corners[[0, -1]], radius, excess)
+
+
 def inner_capsule(shape: pin.GeometryObject) -> Enclosure:
     """Capsule in a shape, in its joint's frame; equal to a capsule or sphere."""
     corners, radius = core(shape)
@@ -137,4 +149,28 @@ def _capsule_in(points: Array) -> dict[str, Any]:
             if volume > best:
                 best, corners = volume, centre + np.outer([low, high], along)
                 found = {"corners": size * corners, "radius": size * radius}
+    return found
+
+
+def _capsule_about(points: Array) -> dict[str, Any]:
+    """Capsule about points along one of their principal axes: the smallest of three."""
+    least, found = np.inf, {"corners": points[:1], "radius": np.inf}
+    for along in np.linalg.svd(points - points.mean(axis=0), full_matrices=False)[2]:
+        places = points @ along
+        across = points - np.outer(places, along)
+        # Steps to the farthest point end in the smallest circle's centre (Badoiu and Clarkson).
+        centre = across.mean(axis=0)
+        for k in range(2, CIRCLE_STEPS):
+            off = across - centre
+            centre = centre + off[np.square(off).sum(axis=1).argmax()] / k
+        squares = np.square(across - centre).sum(axis=1)
+        room = np.sqrt(squares.max() - squares)
+        low, high = (places + room).min(), (places - room).max()
+        low, high = min(low, (low + high) / 2), max(high, (low + high) / 2)
+        beyond = np.clip(places, low, high) - places
+        radius = np.sqrt((squares + beyond**2).max()) * (1 + 1e-9) + 1e-9
+        volume = radius**2 * (high - low + 4 / 3 * radius)
+        if volume < least:
+            least, corners = volume, centre + np.outer([low, high], along)
+            found = {"corners": corners, "radius": radius}
     return found

@@ -323,8 +323,12 @@ class World(GoalKinematics, StepContact):
             space = self._idle.pop()
         except IndexError:
             shapes = self.contact_model.shapes
-            sizes = {"n_pairs": len(shapes.pairs), "n_placed": len(shapes.placed)}
-            space = work_space(n_joints=self.arm.n_joints, **sizes)
+            space = work_space(
+                n_joints=self.arm.n_joints,
+                n_pairs=len(shapes.pairs),
+                n_own=len(shapes.around),
+                n_placed=len(shapes.placed),
+            )
             furnish(shapes.placed, *space)
         n_proven = screen(first, last, np.arange(first, last), *space, *arrays)
         self._idle.append(space)

@@ -225,6 +225,13 @@ def any_lane(_: Any, condition: types.Type) -> Any:
 
 
 @instruction
+def is_number(_: Any, value: types.Type) -> Any:
+    """Whether a value is a number rather than lanes, which is known when kernels are compiled."""
+    truth = ir.Constant(ir.IntType(1), value != lanes)
+    return types.boolean(value), lambda *_: truth
+
+
+@instruction
 def least_lane(_: Any, values: types.Type) -> Any:
     """Least number in lanes."""
 

@@ -22,7 +22,10 @@ from kinarm.kernels.planes import (
     FINE,
     GAP,
     approach,
+    axis_above,
+    has_corners,
     height_above,
+    place_axes,
     propose,
     separate,
 )
@@ -70,19 +73,31 @@ def twist_step(block: Block) -> None:
 def prove_step(shapes: ContactShapes, tested: int, poses: Array, block: Block) -> float:
     """Renew the heights of all pairs; return a bound that shows which steps are free.
 
-    Takes the poses at the target. One bend, larger than any pair's, serves for all.
+    Takes the poses at the target. One bend, larger than any pair's, serves for all. The capsule
+    around a mover has a height, too, and mostly that is enough. Pairs that stay open are listed.
     """
     twist_step(block)
     bend = 0.0 * block.q[0, 0]
     for axis in range(block.twist.shape[0]):
         bend += block.twist[0, axis] * shapes.farthest[axis]
-    bent, least, share = 0.125 * bend, bend + 1.0, tested_from(tested)
+    bent, least, share, n_open = 0.125 * bend, bend + 1.0, tested_from(tested), 0
+    place_axes(shapes, poses, block.axes)
     for pair in range(shapes.planes.shape[0]):
         before = block.planes[pair, GAP]
-        after = height_above(shapes, pair, EVERYDAY, poses, block.planes, pair)
+        after = axis_above(shapes, pair, poses, block.axes, block.planes, pair)
         bound = min(after, before + share * (after - before)) - bent
-        block.height[pair], block.bound[pair], block.planes[pair, GAP] = before, bound, after
+        unproven = ~is_apart(bound)
+        if any_lane(unproven) and has_corners(shapes, shapes.proxies[pair, EVERYDAY, 1]):
+            # Of the others, nothing may depend on who shares the block.
+            closer = height_above(shapes, pair, EVERYDAY, poses, block.planes, pair)
+            after = select(unproven, closer, after)
+            bound = min(after, before + share * (after - before)) - bent
+        block.height[pair], block.planes[pair, GAP] = before, after
+        if any_lane(~is_apart(bound)):
+            block.open[n_open], block.bound[pair] = pair, bound
+            n_open += 1
         least = min(least, bound)
+    block.open[shapes.planes.shape[0]] = n_open
     return least
 
 
@@ -96,7 +111,8 @@ def renew_planes(
     """
     least = 0.0 * block.q[0, 0] + 1.0
     n_pairs, share = shapes.planes.shape[0], tested_from(tested)
-    for pair in range(n_pairs):
+    for index in range(block.open[n_pairs]):
+        pair = block.open[index]
         bound = block.bound[pair]
         open_here = stale & ~is_apart(bound)
         if any_lane(open_here):
@@ -167,9 +183,9 @@ def prove_alone(
         for i in range(3):
             alone.moved[k, i] = as_numbers(before)[frame, 13 + i, lane]
             alone.moved[k, 3 + i] = as_numbers(poses)[frame, 13 + i, lane]
-    at_start, n_open, all_open, n_pairs = False, 0, 0, shapes.planes.shape[0]
-    for index in range(-n_pairs if quick else 0, n_pairs):
-        pair = index + n_pairs if index < 0 else index
+    at_start, n_open, all_open, n_left = False, 0, 0, block.open[shapes.planes.shape[0]]
+    for index in range(-n_left if quick else 0, n_left):
+        pair = block.open[index + n_left if index < 0 else index]
         if quick and alone.suspected[pair] == (index >= 0):
             continue
         if is_apart(as_numbers(block.bound)[pair, lane]):

@@ -11,7 +11,16 @@ from kinarm.kernels.compiling import Array, helper, inlined, lean_kernel
 from kinarm.kernels.kinematics import forward_kinematics, to_world
 from kinarm.kernels.lane_copies import put, put_scene, take, take_rows
 from kinarm.kernels.lanes import LANES, any_lane, as_numbers, lane_bits
-from kinarm.kernels.planes import DEPTH, EVERYDAY, GAP, approach, ball_gap, height_above, lay_plane
+from kinarm.kernels.planes import (
+    DEPTH,
+    EVERYDAY,
+    GAP,
+    approach,
+    axes_apart,
+    height_above,
+    lay_plane,
+    place_axes,
+)
 from kinarm.kernels.proof import is_apart, verdict_of
 from kinarm.kernels.work_space import Alone, Block
 
@@ -41,14 +50,16 @@ def prove_configurations(
     """Bits of the arms that are proven free, and of those that touch.
 
     Takes the poses ``after``, and gives all pairs a first plane. If it is ``hasty``, pairs whose
-    balls are apart get none, nor do those of arms that touch.
+    capsules are apart get none, nor do those of arms that touch.
     """
     poses, planes = block.after, block.planes
     least, depth = 0.0 * block.q[0, 0] + 1.0, 0.0 * block.q[0, 0] - 1.0
+    if hasty:
+        place_axes(shapes, poses, block.axes)
     for pair in range(shapes.planes.shape[0]):
         bound = 0.0 * depth - math.inf
         if hasty:
-            bound = ball_gap(shapes, pair, poses)
+            bound = axes_apart(shapes, pair, poses, block.axes)
         if any_lane(~is_apart(bound) & (depth <= DEPTH)):
             overlap, along = approach(shapes, pair, poses)
             if hasty:

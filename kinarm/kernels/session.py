@@ -142,6 +142,7 @@ class Session(Record):
             "n_actuated": rules.values.step_limit.shape[0],
             "n_observations": n_observations,
             "n_pairs": self.episodes.planes.shape[1],
+            "n_own": len(shapes.values.around),
             "n_terms": rules.values.reward.shape[0],
             "n_placed": shapes.values.placed.shape[0],
             "widest": max(self.control.layers.tolist()[1:], default=1),

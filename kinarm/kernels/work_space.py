@@ -36,6 +36,7 @@ def layouts(
     n_actuated: int = 0,
     n_observations: int = 0,
     n_pairs: int = 0,
+    n_own: int = 0,
     n_terms: int = 0,
     n_placed: int = 0,
     widest: int = 0,
@@ -55,7 +56,7 @@ def layouts(
 
     Parameters
     ----------
-    n_joints, n_actuated, n_observations, n_pairs, n_terms, n_placed, widest : int
+    n_joints, n_actuated, n_observations, n_pairs, n_own, n_terms, n_placed, widest : int
         Sizes of arm, scene, reward and networks; 0 if a kernel does without.
     own : int
         Parameters of an episode's own network.
@@ -100,6 +101,8 @@ def layouts(
         **dict.fromkeys(("before", "after"), (n_joints + 1 + n_placed, Fixed(POSE))),
         # Separating plane of each pair, with its height; the last row is work space.
         "planes": (n_pairs + 1, Fixed(PLANE)),
+        # Middle and half of the axis of the capsule around each of the arm's shapes [m].
+        "axes": (n_own, Fixed(6)),
         # Height before the step, bend, and the bound of both [m].
         **dict.fromkeys(("height", "bend", "bound"), (n_pairs,)),
         # Move of an axis (column) in the step, times itself and twice those before it, from the
@@ -145,9 +148,11 @@ def layouts(
     }
     in_lanes: Shapes = {name: (lanes, shape) for name, shape in block.items()}
     numbers: Shapes = {name: (types.float64, shape) for name, shape in alone.items()}
-    # Episode in each lane, -1 for none; open pairs, and configurations of each; and 1 for pairs
-    # that are looked at first.
+    # Episode in each lane, -1 for none; pairs that a step leaves open in some lane, and last how
+    # many; those of an episode, and configurations of each; and 1 for pairs that are looked at
+    # first.
     in_lanes["row"] = (types.int64, (Fixed(LANES),))
+    in_lanes["open"] = (types.int64, (n_pairs + 1,))
     numbers["listed"] = (types.int64, (n_pairs + 1, Fixed(2)))
     numbers["suspected"] = (types.int64, (n_pairs,))
     return Layout("Block", in_lanes), Layout("Alone", numbers)

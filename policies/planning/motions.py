@@ -95,11 +95,11 @@ def widened(shapes: ContactShapes, margin: float) -> ContactShapes:
     if margin == 0.0:
         return shapes
     n_placed = len(shapes.placed)
-    rounding, capsules, placed = (
-        each.copy() for each in (shapes.rounding, shapes.capsules, shapes.placed)
-    )
+    names = ("rounding", "capsules", "around", "placed")
+    wider = {name: getattr(shapes, name).copy() for name in names}
     of_arm = shapes.bodies[:, 2] <= shapes.bodies[:, 2].max() - n_placed
-    rounding[of_arm] += margin / 2
-    capsules[: len(capsules) - n_placed, 6] += margin / 2
-    placed[:, 3] += margin / 2
-    return shapes._replace(rounding=rounding, capsules=capsules, placed=placed)
+    wider["rounding"][of_arm] += margin / 2
+    wider["capsules"][: len(shapes.around), 6] += margin / 2
+    wider["around"][:, 6] += margin / 2
+    wider["placed"][:, 3] += margin / 2
+    return shapes._replace(**wider)

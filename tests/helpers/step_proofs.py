@@ -5,9 +5,9 @@ from numba import njit
 
 from kinarm.kernels.kinematics import forward_kinematics
 from kinarm.kernels.lane_copies import put
-from kinarm.kernels.lanes import LANES, as_numbers
+from kinarm.kernels.lanes import LANES, as_numbers, select
 from kinarm.kernels.planes import EVERYDAY, GAP, height_above, propose
-from kinarm.kernels.proof import first_contact, prove_alone, prove_step, renew_planes
+from kinarm.kernels.proof import first_contact, is_apart, prove_alone, prove_step, renew_planes
 from kinarm.kernels.work_space import furnish, work_space
 
 
@@ -25,7 +25,7 @@ def prove(chain, shapes, tested, starts, targets, block, alone, bounds, found):
             block.planes[pair, GAP] = height
         first = prove_step(shapes, tested, block.after, block)
         second = renew_planes(shapes, tested, first < 1.0, block.before, block.after, block)
-        block.distance[0], block.total[0] = first, second
+        block.distance[0], block.total[0] = first, select(is_apart(first), first, second)
         bounds[0, i] = as_numbers(block.distance)[0, 0]
         bounds[1, i] = as_numbers(block.total)[0, 0]
         doubt = prove_alone(0, chain, shapes, tested, block.before, block.after, block, alone)
@@ -35,11 +35,16 @@ def prove(chain, shapes, tested, starts, targets, block, alone, bounds, found):
 
 
 def proofs(simulator, tested, starts, targets):
-    """Bounds of the least height in steps, by old and by new planes; doubt, and what touches."""
+    """Bounds of the least height in steps, if need be by new planes; doubt, and what touches."""
     chain, shapes, _ = simulator.world.records
     n = simulator.arm.n_joints
-    sizes = {"n_pairs": len(shapes.planes), "n_placed": len(shapes.placed)}
-    space = work_space(n_joints=n, n_actuated=n, **sizes)
+    space = work_space(
+        n_joints=n,
+        n_actuated=n,
+        n_pairs=len(shapes.planes),
+        n_own=len(shapes.around),
+        n_placed=len(shapes.placed),
+    )
     furnish(shapes.values.placed, *space)
     bounds, found = np.zeros((2, len(starts))), np.zeros((2, len(starts)), dtype=np.int64)
     prove(chain, shapes, tested, starts, targets, *space, bounds, found)

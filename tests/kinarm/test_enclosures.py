@@ -8,12 +8,12 @@ from scipy.optimize import linprog
 from scipy.spatial import ConvexHull
 
 from kinarm.enclosures import (
-    FEW,
     MANY,
     SOME,
     Enclosure,
     enclosing_polytope,
     inner_capsule,
+    outer_capsule,
 )
 from kinarm.errors import ArmError
 
@@ -61,7 +61,7 @@ def test_equals_simple_shapes(name, directions):
     np.testing.assert_allclose(found, expected, rtol=0, atol=1e-12)
 
 
-@pytest.mark.parametrize(("most", "loose"), [(FEW, 0.06), (SOME, 0.004), (MANY, 0.004)])
+@pytest.mark.parametrize(("most", "loose"), [(16, 0.06), (SOME, 0.03), (MANY, 0.004)])
 def test_encloses_a_cylinder_closely(most, loose, directions):
     d = local(directions)
     exact = 0.2 * np.hypot(d[:, 0], d[:, 1]) + 0.3 * np.abs(d[:, 2])
@@ -71,7 +71,7 @@ def test_encloses_a_cylinder_closely(most, loose, directions):
     assert (found - exact).max() < loose
 
 
-@pytest.mark.parametrize("most", [FEW, MANY])
+@pytest.mark.parametrize("most", [16, MANY])
 @pytest.mark.parametrize("count", [5, 60, 2000])
 def test_encloses_every_vertex_of_a_hull(most, count):
     rng = np.random.default_rng(count)
@@ -93,7 +93,7 @@ def test_encloses_every_vertex_of_a_hull(most, count):
         assert found.fun <= enclosure.rounding + 1e-9
 
 
-@pytest.mark.parametrize("enclosing", [inner_capsule, enclosing_polytope])
+@pytest.mark.parametrize("enclosing", [inner_capsule, outer_capsule, enclosing_polytope])
 def test_other_shapes_are_refused(enclosing):
     shape = pin.GeometryObject("cone_0", 1, pin.SE3.Identity(), coal.Cone(0.1, 0.2))
     with pytest.raises(ArmError, match="'cone_0' is a Cone: not supported"):
@@ -130,3 +130,28 @@ def test_the_capsule_in_a_shape(geometry, share, directions):
         reach += directions @ PLACED.translation
     assert (support(Enclosure(np.array([start, end]), radius), directions) <= reach + 1e-9).all()
     assert share - 1e-9 < capsule / whole < 1 + 1e-9
+
+
+@pytest.mark.parametrize("name", ["sphere", "capsule"])
+def test_a_round_shape_is_its_capsule(name, directions):
+    geometry, reach = SIMPLE[name]
+    expected = reach(local(directions)) + directions @ PLACED.translation
+    found = support(outer_capsule(placed(geometry)), directions)
+    np.testing.assert_allclose(found, expected, rtol=0, atol=1e-12)
+
+
+@pytest.mark.parametrize("count", [4, 60, 2000])
+@pytest.mark.parametrize("spread", [(0.3, 0.1, 0.05), (0.1, 0.1, 0.1), (0.2, 0.2, 0.001)])
+def test_a_capsule_around_a_hull_is_slim(count, spread):
+    rng = np.random.default_rng(count)
+    geometry = hull(rng.normal(size=(count, 3)) * spread)
+    (first, last), radius, _ = outer_capsule(placed(geometry))
+    world = np.array([PLACED.act(vertex) for vertex in geometry.points()])
+    length = np.linalg.norm(last - first)
+    along = np.clip((world - first) @ (last - first) / max(length, 1e-12) ** 2, 0, 1)
+    distances = np.linalg.norm(world - first - along[:, None] * (last - first), axis=1)
+    assert distances.max() <= radius
+    # No capsule is slimmer than half of the least width, nor this one much larger than a ball.
+    middle = world.mean(axis=0)
+    assert length / 2 + radius <= 2.0 * np.linalg.norm(world - middle, axis=1).max()
+    assert radius <= np.linalg.norm(world - middle, axis=1).max()

@@ -61,7 +61,7 @@ def sweep(
         forward_kinematics(chain, block.q, 0, block.before)
         forward_kinematics(chain, block.target, 0, block.after)
         twist_step(block)
-        least = 0.0 * block.q[0, 0] + 1.0
+        least, n_open = 0.0 * block.q[0, 0] + 1.0, 0
         for pair in range(shapes.planes.shape[0]):
             far = block.bound[pair]
             if not any_lane(~is_apart(far)):
@@ -76,6 +76,9 @@ def sweep(
             block.height[pair], block.bend[pair], block.bound[pair] = before, bend, bound
             block.planes[pair, GAP] = after
             least = min(least, bound)
+            block.open[n_open] = pair
+            n_open += 1
+        block.open[shapes.planes.shape[0]] = n_open
         free = lane_bits(is_apart(least))
         for lane in range(min(LANES, parts - part)):
             if free >> lane & 1:
