@@ -23,8 +23,8 @@ STRAIGHT = 12
 LOTS = (1, 8)
 """How many of these control has tried after each lot but the last, which has all others."""
 
-PACE = 2
-"""Steps of an episode in one that is tried."""
+PACES = (2, 1)
+"""Steps of an episode in one of a try: first few long ones, and where these get there, all."""
 
 AT_ONCE = 512
 """Goals at once: each may take a few megabytes."""
@@ -35,9 +35,10 @@ def solved_by_ways(
 ) -> tuple[NDArray[np.bool_], Array]:
     """Which goals have a configuration without contact; and goals with such configurations.
 
-    Of up to 384, the first that control reaches (see `reached_by_control`) is taken, those first to
-    which the straight way touches least, and then those that take least time. If control reaches
-    none, it is the first of all.
+    Of up to 384, the first that control reaches (see `reached_by_control`) in steps twice as long
+    and in the episode's own is taken: those first to which the straight way touches least, and then
+    those that take least time. If there is none, it is the first that control reaches in long
+    steps, or else the first of all.
 
     Parameters
     ----------
@@ -47,7 +48,8 @@ def solved_by_ways(
         Goals, shape (n, goal_width), starts, shape (n, n_joints) [rad or m], and the scenes of
         `kinarm.World.scenes_of`.
     """
-    filled, found, ahead = goals.copy(), np.zeros(len(goals), dtype=bool), _ahead(world)
+    filled, found = goals.copy(), np.zeros(len(goals), dtype=bool)
+    ahead, reached = [_ahead(world, pace) for pace in PACES], np.zeros(len(goals), dtype=np.int64)
     for start in range(0, len(goals), AT_ONCE):
         pending = np.arange(start, min(start + AT_ONCE, len(goals)))
         for most, seeds in CANDIDATES:
@@ -58,17 +60,23 @@ def solved_by_ways(
             pending = np.unique(owner)
             q, owner = _in_turn(world, q, owner, starts, scenes)
             rows, first, counts = np.unique(owner, return_index=True, return_counts=True)
-            found[rows], filled[rows, 3:] = True, q[first]
+            found[rows], unreached = True, reached[rows] == 0
+            filled[rows[unreached], 3:] = q[first[unreached]]
             place = np.arange(len(owner)) - np.repeat(first, counts)
             for begun, end in pairwise((0, *LOTS, most)):
                 lot = (place >= begun) & (place < end)
                 tried = np.flatnonzero(lot & np.isin(owner, pending))
                 aims = owner[tried]
                 wanted = np.concatenate([goals[aims, :3], q[tried]], axis=1)
-                reached = reached_by_control(ahead, starts[aims], wanted, scenes_at(scenes, aims))
-                arrived, nearest = np.unique(aims[reached], return_index=True)
-                filled[arrived] = wanted[reached][nearest]
-                pending = np.setdiff1d(pending, arrived)
+                for paces, each in enumerate(ahead, start=1):
+                    given = starts[aims], wanted, scenes_at(scenes, aims)
+                    there = reached_by_control(each, *given)
+                    aims, wanted = aims[there], wanted[there]
+                    arrived, nearest = np.unique(aims, return_index=True)
+                    better = reached[arrived] < paces
+                    filled[arrived[better]] = wanted[nearest[better]]
+                    reached[arrived[better]] = paces
+                pending = pending[reached[pending] < len(ahead)]
     return found, filled
 
 
@@ -111,13 +119,13 @@ def reached_by_control(
     return np.equal(episodes.status, SUCCESS)
 
 
-def _ahead(world: World) -> World:
-    """The world in which ways are tried: joints obey, steps are longer, and nothing is replaced."""
+def _ahead(world: World, pace: int) -> World:
+    """The world in which ways are tried: joints obey, steps may be longer, none is replaced."""
     task, stepping = world.problem.task, world.problem.stepping
     return world.changed(
         plant=Plant(),
-        stepping=replace(stepping, time_step=PACE * stepping.time_step, shield=False),
-        task=replace(task, horizon=-(-task.horizon // PACE)),
+        stepping=replace(stepping, time_step=pace * stepping.time_step, shield=False),
+        task=replace(task, horizon=-(-task.horizon // pace)),
     )
 
 
