@@ -86,16 +86,18 @@ def prove_step(shapes: ContactShapes, tested: int, poses: Array, block: Block) -
         before = block.planes[pair, GAP]
         after = axis_above(shapes, pair, poses, block.axes, block.planes, pair)
         bound = min(after, before + share * (after - before)) - bent
+        block.height[pair] = before
         unproven = ~is_apart(bound)
-        if any_lane(unproven) and has_corners(shapes, shapes.proxies[pair, EVERYDAY, 1]):
-            # Of the others, nothing may depend on who shares the block.
-            closer = height_above(shapes, pair, EVERYDAY, poses, block.planes, pair)
-            after = select(unproven, closer, after)
-            bound = min(after, before + share * (after - before)) - bent
-        block.height[pair], block.planes[pair, GAP] = before, after
-        if any_lane(~is_apart(bound)):
-            block.open[n_open], block.bound[pair] = pair, bound
-            n_open += 1
+        if any_lane(unproven):
+            if has_corners(shapes, shapes.proxies[pair, EVERYDAY, 1]):
+                # Of the others, nothing may depend on who shares the block.
+                closer = height_above(shapes, pair, EVERYDAY, poses, block.planes, pair)
+                after = select(unproven, closer, after)
+                bound = min(after, before + share * (after - before)) - bent
+            if any_lane(~is_apart(bound)):
+                block.open[n_open], block.bound[pair] = pair, bound
+                n_open += 1
+        block.planes[pair, GAP] = after
         least = min(least, bound)
     block.open[shapes.planes.shape[0]] = n_open
     return least
