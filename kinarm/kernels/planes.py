@@ -87,6 +87,17 @@ def box_about(shapes: ContactShapes, body: int, poses: Array) -> tuple[Vector, V
 
 
 @inlined
+def off_box(shapes: ContactShapes, body: int, point: Vector, poses: Array) -> Vector:
+    """Shortest vector from the box about a body of the scene to a point, in the body's frame."""
+    x, y, z = to_frame(poses, shapes.bodies[body, 2], point)
+    lower, upper = box_about(shapes, body, poses)
+    x -= min(max(x, lower[0]), upper[0])
+    y -= min(max(y, lower[1]), upper[1])
+    z -= min(max(z, lower[2]), upper[2])
+    return x, y, z
+
+
+@inlined
 def lowest(shapes: ContactShapes, body: int, x: float, y: float, z: float) -> float:
     """Least coordinate of a body's corners along a vector of its joint frame."""
     if is_number(x):
@@ -178,12 +189,7 @@ def axes_apart(shapes: ContactShapes, pair: int, poses: Array, axes: Array) -> f
         return height - extent(axes, mover, nx, ny, nz)
     reach = 0.0
     if is_placed(shapes, frame, poses):
-        x, y, z = to_frame(poses, frame, (x, y, z))
-        lower, upper = box_about(shapes, carrier, poses)
-        x -= min(max(x, lower[0]), upper[0])
-        y -= min(max(y, lower[1]), upper[1])
-        z -= min(max(z, lower[2]), upper[2])
-        x, y, z = rotated(poses, frame, x, y, z)
+        x, y, z = rotated(poses, frame, *off_box(shapes, carrier, (x, y, z), poses))
         radius = radius + poses[frame, 3]
     else:
         x, y, z = x - axes[carrier, 0], y - axes[carrier, 1], z - axes[carrier, 2]
@@ -204,11 +210,7 @@ def ball_gap(shapes: ContactShapes, pair: int, poses: Array) -> float:
         nx, ny, nz, offset = surface(poses, frame)
         return nx * x + ny * y + nz * z - offset - around - poses[frame, 3]
     if is_placed(shapes, frame, poses):
-        x, y, z = to_frame(poses, frame, (x, y, z))
-        lower, upper = box_about(shapes, carrier, poses)
-        x -= min(max(x, lower[0]), upper[0])
-        y -= min(max(y, lower[1]), upper[1])
-        z -= min(max(z, lower[2]), upper[2])
+        x, y, z = off_box(shapes, carrier, (x, y, z), poses)
         around += poses[frame, 3]
     else:
         u, v, w = to_world(poses, frame, balls[carrier, 0], balls[carrier, 1], balls[carrier, 2])
