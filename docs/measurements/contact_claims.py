@@ -129,7 +129,7 @@ def check_steps(arm: str, rng: np.random.Generator, size: int) -> Checked:
 PARTS = {
     "configurations": (check_configurations, 20_000, 1_000_000),
     "episodes": (check_episodes, 50, 10_000),
-    "steps": (check_steps, 100, 1_000_000),
+    "steps": (check_steps, 1_000, 1_000_000),
 }
 """What is checked; how many cases are a lot, and wanted of each arm."""
 
