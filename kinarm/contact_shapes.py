@@ -37,11 +37,11 @@ class ContactShapes(NamedTuple):
     """Shapes, pairs and motion bounds as flat arrays.
 
     A *body* is a rounded polytope: about each shape of the arm, then of the
-    scene; last come fine ones about shapes whose first is coarse. Each
-    lies in a frame, of which there is a row in ``poses``: frame 0 is the world, k
-    the k-th joint, and further ones are those of the scene's bodies. Such a row
-    (`placed`) has a size and a rounding instead of a quaternion: the body's
-    corners are multiplied by that size.
+    scene; last come fine ones about shapes whose first is coarse. Each lies in a
+    frame, of which there is a row in ``poses``: frame 0 is the world, k the k-th
+    joint, and further ones are those of the scene's bodies. Such a row (`placed`)
+    has a size and a rounding instead of a quaternion: the body's corners are
+    multiplied by that size.
 
     Attributes
     ----------

@@ -49,6 +49,7 @@ def solved_by_ways(
         `kinarm.World.scenes_of`.
     """
     filled, found = goals.copy(), np.zeros(len(goals), dtype=bool)
+    # How many of the paces control gets there in.
     ahead, reached = [_ahead(world, pace) for pace in PACES], np.zeros(len(goals), dtype=np.int64)
     for start in range(0, len(goals), AT_ONCE):
         pending = np.arange(start, min(start + AT_ONCE, len(goals)))
@@ -68,14 +69,14 @@ def solved_by_ways(
                 tried = np.flatnonzero(lot & np.isin(owner, pending))
                 aims = owner[tried]
                 wanted = np.concatenate([goals[aims, :3], q[tried]], axis=1)
-                for paces, each in enumerate(ahead, start=1):
+                for passed, each in enumerate(ahead, start=1):
                     given = starts[aims], wanted, scenes_at(scenes, aims)
                     there = reached_by_control(each, *given)
                     aims, wanted = aims[there], wanted[there]
                     arrived, nearest = np.unique(aims, return_index=True)
-                    better = reached[arrived] < paces
+                    better = reached[arrived] < passed
                     filled[arrived[better]] = wanted[nearest[better]]
-                    reached[arrived[better]] = paces
+                    reached[arrived[better]] = passed
                 pending = pending[reached[pending] < len(ahead)]
     return found, filled
 
