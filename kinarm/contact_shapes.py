@@ -164,7 +164,7 @@ class ContactShapes(NamedTuple):
         inner = map(inner_capsule, objects)
         capsules = [np.append(each.corners, each.rounding) for each in inner]
         capsules += [np.append(AXIS, 0.0 if each.exact else -np.inf) for each in surroundings]
-        outer = ((*each.corners[[0, -1]], each.rounding) for each in map(outer_capsule, objects))
+        outer = ((*each.corners, each.rounding) for each in map(outer_capsule, objects))
         around = [(*(a + b) / 2, *(b - a) / 2, radius) for a, b, radius in outer]
         exact = [isinstance(each.geometry, coal.Capsule | coal.Sphere) for each in objects]
         exact += [each.exact for each in surroundings]

@@ -25,7 +25,7 @@ from kinarm.kernels.rollout import begin
 from kinarm.kernels.screening import screen
 from kinarm.kernels.session import Session
 from kinarm.kernels.shield import REPLACE_STEP
-from kinarm.kernels.work_space import Alone, Block, furnish, work_space
+from kinarm.kernels.work_space import Alone, Block, furnish, sizes_of, work_space
 from kinarm.observation import observer
 from kinarm.observation_layout import ObservationLayout
 from kinarm.problem import ProblemLike, ReachProblem
@@ -323,12 +323,7 @@ class World(GoalKinematics, StepContact):
             space = self._idle.pop()
         except IndexError:
             shapes = self.contact_model.shapes
-            space = work_space(
-                n_joints=self.arm.n_joints,
-                n_pairs=len(shapes.pairs),
-                n_own=len(shapes.around),
-                n_placed=len(shapes.placed),
-            )
+            space = work_space(n_joints=self.arm.n_joints, **sizes_of(shapes))
             furnish(shapes.placed, *space)
         n_proven = screen(first, last, np.arange(first, last), *space, *arrays)
         self._idle.append(space)

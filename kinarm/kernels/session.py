@@ -15,7 +15,7 @@ from kinarm.kernels.compiling import Array, Stage, helper
 from kinarm.kernels.lane_copies import move_bodies, put, put_scene, take, take_rows
 from kinarm.kernels.lanes import as_numbers, instruction
 from kinarm.kernels.records import Record, table
-from kinarm.kernels.work_space import Alone, Block, furnish, layouts, work_space
+from kinarm.kernels.work_space import Alone, Block, furnish, layouts, sizes_of, work_space
 
 
 @helper
@@ -138,13 +138,11 @@ class Session(Record):
         weights, n_observations = self.control.weights, self.episodes.observation.shape[1]
         lags = self.episodes.plant.shape[1] > 0 or len(shapes.values.moving) > 0
         sizes = {
+            **sizes_of(shapes.values),
             "n_joints": self.episodes.q.shape[1],
             "n_actuated": rules.values.step_limit.shape[0],
             "n_observations": n_observations,
-            "n_pairs": self.episodes.planes.shape[1],
-            "n_own": len(shapes.values.around),
             "n_terms": rules.values.reward.shape[0],
-            "n_placed": shapes.values.placed.shape[0],
             "widest": max(self.control.layers.tolist()[1:], default=1),
             "own": weights.shape[1] if weights.shape[0] > 1 else 0,
             "summed": n_observations if len(self.episodes.moments) > 0 else 0,

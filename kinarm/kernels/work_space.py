@@ -5,7 +5,7 @@ from typing import Any, TypeAlias
 
 from numba import types
 
-from kinarm.contact_shapes import PLANE
+from kinarm.contact_shapes import PLANE, ContactShapes
 from kinarm.kernels.compiling import Array, lean_kernel
 from kinarm.kernels.kinematics import POSE, place_bodies
 from kinarm.kernels.lanes import LANES, lanes
@@ -28,6 +28,12 @@ def work_space(**sizes: int) -> tuple[Block, Alone]:
     """Records of a block and a single episode's space, of sizes as in `layouts`."""
     block, alone = layouts(**sizes)
     return block.record(), alone.record()
+
+
+def sizes_of(shapes: ContactShapes) -> dict[str, int]:
+    """Sizes for `layouts` of what may touch."""
+    counted = {"n_pairs": shapes.pairs, "n_own": shapes.around, "n_placed": shapes.placed}
+    return {name: len(each) for name, each in counted.items()}
 
 
 @cache

@@ -7,7 +7,7 @@ from kinarm.contact_shapes import ContactShapes
 from kinarm.kernels.compiling import Array
 from kinarm.kernels.lanes import LANES
 from kinarm.kernels.records import recorded
-from kinarm.kernels.work_space import furnish, work_space
+from kinarm.kernels.work_space import furnish, sizes_of, work_space
 from kinarm.policies.planning.kernels.sweeping import sweep
 from kinarm.step_contact import first_share
 from kinarm.world import World
@@ -43,10 +43,8 @@ class Motions:
         self.world, self.margin, self.moved = world, margin, world.n_actions
         shapes = widened(world.contact_model.shapes, margin)
         self._chain, self._shapes = world.records[0], recorded(shapes)
-        sizes = {"n_pairs": len(shapes.pairs), "n_placed": len(shapes.placed)}
-        self._space = work_space(
-            n_joints=world.arm.n_joints, n_actuated=world.arm.n_actuated, **sizes
-        )
+        joints = {"n_joints": world.arm.n_joints, "n_actuated": world.arm.n_actuated}
+        self._space = work_space(**joints, **sizes_of(shapes))
         furnish(shapes.placed, *self._space)
         self.farthest = shapes.farthest
         self.speeds = world.arm.velocity_limits[: self.moved]

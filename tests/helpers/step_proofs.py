@@ -8,7 +8,7 @@ from kinarm.kernels.lane_copies import put
 from kinarm.kernels.lanes import LANES, as_numbers, select
 from kinarm.kernels.planes import EVERYDAY, GAP, height_above, propose
 from kinarm.kernels.proof import first_contact, is_apart, prove_alone, prove_step, renew_planes
-from kinarm.kernels.work_space import furnish, work_space
+from kinarm.kernels.work_space import furnish, sizes_of, work_space
 
 
 @njit
@@ -38,13 +38,7 @@ def proofs(simulator, tested, starts, targets):
     """Bounds of the least height in steps, if need be by new planes; doubt, and what touches."""
     chain, shapes, _ = simulator.world.records
     n = simulator.arm.n_joints
-    space = work_space(
-        n_joints=n,
-        n_actuated=n,
-        n_pairs=len(shapes.planes),
-        n_own=len(shapes.around),
-        n_placed=len(shapes.placed),
-    )
+    space = work_space(n_joints=n, n_actuated=n, **sizes_of(shapes.values))
     furnish(shapes.values.placed, *space)
     bounds, found = np.zeros((2, len(starts))), np.zeros((2, len(starts)), dtype=np.int64)
     prove(chain, shapes, tested, starts, targets, *space, bounds, found)
