@@ -22,13 +22,11 @@ from kinarm.kernels.planes import (
     FINE,
     GAP,
     approach,
-    axis_above,
-    has_corners,
     height_above,
-    place_axes,
     propose,
     separate,
 )
+from kinarm.kernels.rough_bounds import axis_above, has_corners, place_axes
 from kinarm.kernels.work_space import Alone, Block
 
 MARGIN = 2e-6

@@ -11,17 +11,9 @@ from kinarm.kernels.compiling import Array, helper, inlined, lean_kernel
 from kinarm.kernels.kinematics import forward_kinematics, to_world
 from kinarm.kernels.lane_copies import put, put_scene, take, take_rows
 from kinarm.kernels.lanes import LANES, any_lane, as_numbers, lane_bits
-from kinarm.kernels.planes import (
-    DEPTH,
-    EVERYDAY,
-    GAP,
-    approach,
-    axes_apart,
-    height_above,
-    lay_plane,
-    place_axes,
-)
+from kinarm.kernels.planes import DEPTH, EVERYDAY, GAP, approach, height_above, lay_plane
 from kinarm.kernels.proof import is_apart, verdict_of
+from kinarm.kernels.rough_bounds import axes_apart, place_axes
 from kinarm.kernels.work_space import Alone, Block
 
 

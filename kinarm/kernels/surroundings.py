@@ -8,7 +8,8 @@ from typing import NamedTuple
 from kinarm.kernels.compiling import Array, Vector, helper
 from kinarm.kernels.kinematics import point_jacobian, rotated, rotated_back
 from kinarm.kernels.lanes import any_lane, select
-from kinarm.kernels.planes import FINE, ball_gap, foot, height_above, is_placed, propose
+from kinarm.kernels.planes import FINE, foot, height_above, is_placed, propose
+from kinarm.kernels.rough_bounds import ball_gap
 from kinarm.kernels.session import Session
 
 NEAR = 0.5

@@ -5,8 +5,9 @@ from kinarm.contact_shapes import ContactShapes
 from kinarm.kernels.compiling import Array, lean_kernel
 from kinarm.kernels.kinematics import forward_kinematics
 from kinarm.kernels.lanes import LANES, any_lane, as_numbers, lane_bits
-from kinarm.kernels.planes import EVERYDAY, GAP, ball_gap, height_above, propose
+from kinarm.kernels.planes import EVERYDAY, GAP, height_above, propose
 from kinarm.kernels.proof import first_contact, is_apart, prove_alone, twist_step
+from kinarm.kernels.rough_bounds import ball_gap
 from kinarm.kernels.work_space import Alone, Block
 
 THROUGHOUT = 0

@@ -9,14 +9,11 @@ from kinarm.kernels.kinematics import POSE, forward_kinematics, place_bodies
 from kinarm.kernels.planes import (
     EVERYDAY,
     FINE,
-    axes_apart,
-    axis_above,
-    ball_gap,
     height_above,
-    place_axes,
     propose,
     separate,
 )
+from kinarm.kernels.rough_bounds import axes_apart, axis_above, ball_gap, place_axes
 
 
 @njit
