@@ -26,7 +26,7 @@ from kinarm.kernels.plant import COMMAND
 from kinarm.kernels.session import Session
 from kinarm.kernels.surroundings import NEAR, Seen, write_obstacles, write_proximity
 from kinarm.kernels.work_space import POSES
-from kinarm.observation_part import ACTUATED, JOINTS, ONCE, SLOTS, Part, Ranges
+from kinarm.observation_part import ACTUATED, JOINTS, ONCE, SLOTS, UNIT, Part, Ranges
 from kinarm.scene import Scene
 
 if TYPE_CHECKING:
@@ -115,9 +115,6 @@ def _has_no_obstacles(_: "Arm", scene: Scene) -> str:
 POLAR = (1, -1, 1)
 """Signs of a vector in the reflection y -> -y."""
 
-UNIT = 1 + 1e-6
-"""Largest entry of a unit vector or an action, to within rounding."""
-
 
 def _rest_parts(
     kind: str, meaning: str, signs: tuple[int, ...], of: str = ONCE, unit: str = "1"
@@ -168,9 +165,7 @@ OBSERVATION = (
             "action of resolved-rate control: a damped Newton step from the commanded joints to "
             "the goal, blind to contact, for each actuated joint, shortened as a whole to 1 at most"
         ),
-        unit="1",
         signs=(0,),
-        bounds=lambda _: (-UNIT, UNIT),
         write=write_resolved_rate,
         of=ACTUATED,
         of_goal=True,
@@ -178,9 +173,7 @@ OBSERVATION = (
     Part(
         name="orientation",
         meaning="orientation of each joint frame, quaternion w, x, y, z",
-        unit="1",
         signs=(1, -1, 1, -1),
-        bounds=lambda _: (-UNIT, UNIT),
         write=_of_frames(0, 4),
         of=JOINTS,
     ),
@@ -205,9 +198,7 @@ OBSERVATION = (
     Part(
         name="joint_angles",
         meaning="sine and cosine of each joint's angle",
-        unit="1",
         signs=(0, 1),
-        bounds=lambda _: (-UNIT, UNIT),
         write=_write_angles,
         of=JOINTS,
         lacks=_slides,
@@ -215,7 +206,6 @@ OBSERVATION = (
     Part(
         name="joint_velocities",
         meaning="velocity of each actuated joint in the last step, as a fraction of its limit",
-        unit="1",
         signs=(0,),
         bounds=lambda ranges: (-ranges.fastest, ranges.fastest),
         write=_write_velocities,
@@ -224,9 +214,7 @@ OBSERVATION = (
     Part(
         name="last_action",
         meaning="last action, clipped; zeros at the start",
-        unit="1",
         signs=(0,),
-        bounds=lambda _: (-UNIT, UNIT),
         write=_write_action,
         of=ACTUATED,
     ),
@@ -242,7 +230,6 @@ OBSERVATION = (
     Part(
         name="time_left",
         meaning="share of the horizon that is left",
-        unit="1",
         signs=(1,),
         bounds=lambda _: (0.0, 1.0),
         write=_write_time,

@@ -14,6 +14,9 @@ if TYPE_CHECKING:
 ONCE, JOINTS, ACTUATED, SLOTS = "", "n", "a", "k"
 """What has a part: the arm, each joint, each actuated joint, or each slot for a body."""
 
+UNIT = 1 + 1e-6
+"""Largest entry of a unit vector or an action, to within rounding."""
+
 
 class Ranges(NamedTuple):
     """Ranges of the entries of an observation in a problem.
@@ -36,14 +39,17 @@ class Part(NamedTuple):
 
     Attributes
     ----------
-    name, meaning, unit : str
+    name, meaning : str
         Its name in layouts, and its meaning for people.
     signs : tuple of int
         Signs of its entries in the reflection y -> -y; 0 for that of the joint.
-    bounds : callable
-        From `Ranges` to lowest and highest values of its entries.
     write : callable
         Formula; see `write_goal`.
+    unit : str
+        For people; by default they have none.
+    bounds : callable
+        From `Ranges` to lowest and highest values of its entries, by default
+        those of unit vectors and actions.
     of : str
         What has one: `ONCE`, `JOINTS`, `ACTUATED` or `SLOTS`.
     sloped : bool
@@ -56,10 +62,10 @@ class Part(NamedTuple):
 
     name: str
     meaning: str
-    unit: str
     signs: tuple[int, ...]
-    bounds: Callable[[Ranges], tuple[Array | float, Array | float]]
     write: Callable[[Session, Seen, int, int], None]
+    unit: str = "1"
+    bounds: Callable[[Ranges], tuple[Array | float, Array | float]] = lambda _: (-UNIT, UNIT)
     of: str = ONCE
     sloped: bool = False
     of_goal: bool = False

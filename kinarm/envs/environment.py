@@ -11,8 +11,7 @@ from numpy.typing import DTypeLike, NDArray
 from kinarm.envs.rendering import RENDER_MODES, EnvPictures
 from kinarm.episodes import Episodes
 from kinarm.errors import InvalidInputError, UnknownNameError, one_or_many
-from kinarm.observation import UNIT
-from kinarm.observation_part import Ranges
+from kinarm.observation_part import UNIT, Ranges
 from kinarm.plant import MOST_NOISE, RANGES
 from kinarm.problem import ProblemLike, ReachProblem
 from kinarm.scenarios import ScenarioQueues
