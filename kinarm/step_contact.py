@@ -24,13 +24,7 @@ MOST_ASKED = 20_000
 
 
 class StepContact:
-    """Asks Coal about steps, by the rules of a problem.
-
-    Attributes
-    ----------
-    problem, rules, contact_model
-        As of `kinarm.World`.
-    """
+    """Asks Coal about steps, by the rules of a problem; for `kinarm.World`."""
 
     problem: ReachProblem
     rules: Rules
@@ -62,11 +56,20 @@ class StepContact:
 
     def contact_of_step(self, step: Step) -> Contact | None:
         """Describe the first contact of a step of `steps_of`, or return None."""
-        if self.rules.tested == 0:
-            return contact_in_motion(step)
-        asked = (step.at(k / self.rules.tested) for k in range(1, self.rules.tested + 1))
-        contacts = (model.contact(q) for model, q in asked)
-        return next((contact for contact in contacts if contact), None)
+        if self.rules.tested:
+            asked = (step.at(k / self.rules.tested) for k in range(1, self.rules.tested + 1))
+            contacts = (model.contact(q) for model, q in asked)
+            return next((contact for contact in contacts if contact), None)
+        share, _ = first_share(step, 0.0, 1.0)
+        if share is None:
+            return None
+        model, q = step.at(share)
+        if contact := model.contact(q):
+            return contact
+        # It is closer than can be told apart.
+        distances, points = _distances(model, q, range(len(model.pair_names)))
+        nearest = int(np.argmin(distances))
+        return Contact(q, model.pair_names[nearest], points[nearest])
 
     def steps_of(
         self, starts: Array, ends: Array, scenes: Array, taken: NDArray[np.int64]
@@ -108,20 +111,6 @@ class StepContact:
         """Names of the bodies of what `contact` describes, or None."""
         contact = self.contact(configuration, target, step=step)
         return contact.pair if contact else None
-
-
-def contact_in_motion(step: Step) -> Contact | None:
-    """Describe the first contact on a straight way, or return None."""
-    share, _ = first_share(step, 0.0, 1.0)
-    if share is None:
-        return None
-    model, configuration = step.at(share)
-    contact = model.contact(configuration)
-    if contact is None:  # but closer than can be told apart
-        distances, points = _distances(model, configuration, range(len(model.pair_names)))
-        nearest = int(np.argmin(distances))
-        contact = Contact(configuration, model.pair_names[nearest], points[nearest])
-    return contact
 
 
 def steps_in_contact(
