@@ -15,7 +15,7 @@ from kinarm.viewer.camera import Camera
 
 if TYPE_CHECKING:
     from kinarm.collision import Contact
-    from kinarm.viewer.live_stage import LiveStage
+    from kinarm.viewer.drawing import LiveStage
     from kinarm.viewer.renderer import Renderer
 
 Picture = NDArray[np.uint8]
@@ -150,7 +150,7 @@ class EnvPictures:
 
     def _live_stage(self) -> "LiveStage":
         if self._stage is None:
-            from kinarm.viewer.live_stage import LiveStage
+            from kinarm.viewer.drawing import LiveStage
 
             self._stage = LiveStage(self._simulator.problem, self._simulator.arm)
             webbrowser.open(self._stage.address)

@@ -8,14 +8,12 @@ from typing import Any
 import coal
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 
 from kinarm.arm import Arm
 from kinarm.body_motion import BodyMotion
 from kinarm.collision import ContactModel
 from kinarm.enclosures import core
 from kinarm.errors import InvalidInputError
-from kinarm.problem import ReachProblem
 from kinarm.recording import Recording
 from kinarm.scene import Scene
 from kinarm.viewer.camera import stage_scale
@@ -29,7 +27,7 @@ RUN_FIELDS = ("policy", "outcome", "contact", "replaced", "refused", "states", "
 
 
 def arm_data(arm: Arm, scene: Scene) -> dict[str, Any]:
-    """Describe an arm: axes, tool, joints of its bodies, colour and size."""
+    """Describe an arm: axes, tool, joints of its bodies, colour and size; and a page's colours."""
     chain, painted = arm.chain, Counter[int]()
     columns = chain.translation, chain.rotation, chain.axis, chain.prismatic
     for part in arm_parts(arm):
@@ -44,6 +42,7 @@ def arm_data(arm: Arm, scene: Scene) -> dict[str, Any]:
         "links": link_joints(arm),
         "scale": stage_scale(arm, scene),
         "swatch": f"#{painted.most_common(1)[0][0]:06x}",
+        "colours": {name: f"#{colour:06x}" for name, colour in PAGE_COLOURS.items()},
     }
 
 
@@ -124,7 +123,6 @@ def replay_page(
     data = {
         **arm_data(arm, scene),
         "traceIndices": 6 * TRACE_SIDES,
-        "colours": {name: f"#{colour:06x}" for name, colour in PAGE_COLOURS.items()},
         "trials": shown,
         "groups": list(groups),
         "heading": heading,
@@ -162,12 +160,13 @@ def _trial_data(runs: Sequence[Recording], moving: Mapping[str, BodyMotion]) -> 
     """A trial that was recorded, and what moves in it, as JSON."""
     first, problem = runs[0], runs[0].problem
     goals = first.goal[None] if first.goals is None else first.goals
+    placed = (pin.SE3(goal_pose(problem.task.goal, goal)) for goal in goals)
     steps = np.arange(max(len(run.states) for run in runs), dtype=np.float64)
     times = steps * problem.stepping.time_step
     return {
         "problem": problem.name,
         "trial": first.trial,
-        "goals": [_placed(problem, goal) for goal in goals],
+        "goals": [pin.SE3ToXYZQUAT(pose).tolist() for pose in placed],
         "tolerance": problem.task.tolerance,
         "horizon": problem.task.horizon,
         "timeStep": problem.stepping.time_step,
@@ -181,9 +180,3 @@ def _trial_data(runs: Sequence[Recording], moving: Mapping[str, BodyMotion]) -> 
             for run in runs
         ],
     }
-
-
-def _placed(problem: ReachProblem, goal: NDArray[np.float64]) -> list[float]:
-    """Position of a goal [m], and quaternion x y z w of its marks."""
-    pose = goal_pose(problem.task.goal, goal)
-    return [*pose[:3, 3].tolist(), *pin.Quaternion(pose[:3, :3]).coeffs().tolist()]

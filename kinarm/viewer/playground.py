@@ -16,7 +16,6 @@ from kinarm.shield import shield_table
 from kinarm.viewer.drawing import DrawnScene, draw_stage
 from kinarm.viewer.html_page import HtmlPage, page_html
 from kinarm.viewer.pages import arm_data, contact_data
-from kinarm.viewer.parts import PAGE_COLOURS
 from kinarm.world import World
 
 SERVOS = (0.0, 20.0, 10.0, 5.0)
@@ -67,7 +66,6 @@ def play_page(
         "trials": {"starts": starts, "goals": goals},
         "shield": shield,
         "plant": {"servo": problem.plant.bandwidth, "delay": problem.plant.delay},
-        "colours": {name: f"#{colour:06x}" for name, colour in PAGE_COLOURS.items()},
     }
     return HtmlPage(page_html("play", f"{arm.name} · kinarm", drawn.content, data, SCRIPTS))
 

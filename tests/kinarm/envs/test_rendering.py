@@ -11,7 +11,7 @@ import pytest
 
 from kinarm.envs import ReachEnv, ReachGoalEnv, ReachVectorEnv
 from kinarm.errors import InvalidInputError
-from kinarm.viewer import Camera, Renderer, live_stage
+from kinarm.viewer import Camera, Renderer, drawing
 
 pytest.importorskip("raylib")
 
@@ -23,7 +23,7 @@ def opened(monkeypatch):
     """Addresses that would be opened in a browser; no time is spent at real pace."""
     addresses = []
     monkeypatch.setattr(webbrowser, "open", addresses.append)
-    monkeypatch.setattr(live_stage.time, "sleep", lambda _: None)
+    monkeypatch.setattr(drawing.time, "sleep", lambda _: None)
     return addresses
 
 
@@ -139,8 +139,8 @@ class TestHuman:
 
     def test_keeps_the_arms_own_time(self, monkeypatch, opened):
         waits, now = [], [100.0]
-        monkeypatch.setattr(live_stage.time, "sleep", waits.append)
-        monkeypatch.setattr(live_stage.time, "monotonic", lambda: now[0])
+        monkeypatch.setattr(drawing.time, "sleep", waits.append)
+        monkeypatch.setattr(drawing.time, "monotonic", lambda: now[0])
         env = moved(ReachEnv(render_mode="human"), 0)
         env.step(np.zeros(5))
         now[0] += 0.005
