@@ -29,22 +29,9 @@ FULL_SIZE = 4
 
 
 class EnvPictures:
-    """Pictures of the arms of an environment.
+    """Pictures of the arms of an environment, by the settings of `ReachEnv`.
 
-    Nothing is drawn or imported before it is needed.
-
-    Parameters
-    ----------
-    simulator : Simulator
-        Of the environment.
-    mode : str, optional
-        One of `RENDER_MODES`; with None, nothing happens.
-    num_envs : int
-        Number of arms.
-    width, height : int
-        Size of a picture [pixels]. More than four arms share the area of four.
-    camera : Camera, optional
-        Place of the camera; that of the replay page by default.
+    Without a mode nothing happens, and nothing is drawn or imported before it is needed.
     """
 
     def __init__(
@@ -53,9 +40,9 @@ class EnvPictures:
         mode: str | None,
         num_envs: int,
         *,
-        width: int = 480,
-        height: int = 360,
-        camera: Camera | None = None,
+        width: int,
+        height: int,
+        camera: Camera | None,
     ) -> None:
         if mode is not None and mode not in RENDER_MODES:
             raise InvalidInputError(
