@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 from kinarm.bodies import rotation_matrix, rotation_of_quaternion
 from kinarm.chain import quaternion_of
 from kinarm.collision import ContactModel
-from kinarm.episode_scenes import scenes_at
+from kinarm.episode_draws import scenes_at
 from kinarm.episodes import Pursuit, Rules
 from kinarm.errors import LARGEST, InvalidInputError, ProblemError, finite_array
 from kinarm.goals import Goals, unit

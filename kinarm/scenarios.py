@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from kinarm.episode_scenes import bits_of, scenes_at
+from kinarm.episode_draws import bits_of, scenes_at
 from kinarm.errors import ProblemError, whole_number
 from kinarm.goal_kinematics import SAMPLE
 from kinarm.kernels.compiling import Array

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kinarm._parallel import run_together
-from kinarm.episode_scenes import scenes_at
+from kinarm.episode_draws import scenes_at
 from kinarm.episodes import LINEAR, SUCCESS, Control
 from kinarm.kernels.compiling import Array
 from kinarm.kernels.rollout import advance, begin

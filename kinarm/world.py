@@ -13,8 +13,7 @@ from kinarm.bodies import PARKED
 from kinarm.chain import Chain
 from kinarm.collision import ContactModel
 from kinarm.contact_shapes import PLANE, ContactShapes, unit_boxes
-from kinarm.episode_plants import EpisodePlants
-from kinarm.episode_scenes import drawn_rows
+from kinarm.episode_draws import EpisodePlants, drawn_rows
 from kinarm.episodes import Control, Episodes, Rules
 from kinarm.errors import InvalidInputError, finite_array, one_or_many, whole_number
 from kinarm.goal_kinematics import GoalKinematics

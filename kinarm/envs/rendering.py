@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from kinarm.episode_scenes import scene_of_episode
+from kinarm.episode_draws import scene_of_episode
 from kinarm.episodes import COLLISION, SUCCESS, TRUNCATED, Episodes
 from kinarm.errors import InvalidInputError, whole_number
 from kinarm.simulator import Simulator

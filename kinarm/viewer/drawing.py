@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from kinarm.arm import Arm
 from kinarm.body_motion import BodyMotion
-from kinarm.episode_scenes import scene_of_episode
+from kinarm.episode_draws import scene_of_episode
 from kinarm.kernels.compiling import Array
 from kinarm.problem import ReachProblem
 from kinarm.scene import Scene

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from kinarm.collision import ContactModel
-from kinarm.episode_plants import EpisodePlants
+from kinarm.episode_draws import EpisodePlants
 from kinarm.errors import InvalidInputError
 from kinarm.kernels.compiling import Array
 from kinarm.kernels.plant import RATE, SERVO, TRAPEZE

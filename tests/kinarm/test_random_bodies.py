@@ -8,7 +8,7 @@ from numba import njit
 from reference_episodes import compare_actions
 
 from kinarm.bodies import Body, RandomBodies
-from kinarm.episode_scenes import scene_of_episode
+from kinarm.episode_draws import scene_of_episode
 from kinarm.errors import KinarmError
 from kinarm.kernels.placing import uniform
 from kinarm.meshes import coal_shape
