@@ -4,7 +4,6 @@
 as flat arrays (`ContactShapes`), from which kernels prove most configurations.
 """
 
-import warnings
 from dataclasses import dataclass, fields, replace
 from functools import cached_property
 from typing import NamedTuple
@@ -176,16 +175,6 @@ class ContactModel:
         requests, results = list(data.collisionRequests), list(data.collisionResults)
         start_anew(requests)
         return self.arm.model.createData(), data, requests, results
-
-    @cached_property
-    def measuring(self) -> pin.GeometryData:
-        """Coal's data whose distances do not depend on what was measured before."""
-        data = self.geometry.createData()
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", DeprecationWarning)
-            for request in data.distanceRequests:
-                request.enable_cached_gjk_guess = False
-        return data
 
     @cached_property
     def pair_names(self) -> tuple[tuple[str, str], ...]:

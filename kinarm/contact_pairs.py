@@ -24,7 +24,7 @@ MOUNT_SAMPLES = 721
 
 
 def make_verdicts_reliable(data: pin.GeometryData) -> pin.GeometryData:
-    """Make Coal's verdicts reliable and a function of the configuration alone; return the data.
+    """Make Coal's answers reliable and functions of the configuration alone; return the data.
 
     By default Coal starts where its last call on the same pair ended, and verdicts within its
     tolerance of 1e-6 m depend on that. A guess in the request, which `start_anew` puts back,
@@ -37,6 +37,8 @@ def make_verdicts_reliable(data: pin.GeometryData) -> pin.GeometryData:
             request.enable_cached_gjk_guess = False
             request.gjk_initial_guess = coal.GJKInitialGuess.CachedGuess
             request.enable_contact = True
+        for request in data.distanceRequests:
+            request.enable_cached_gjk_guess = False
     return data
 
 

@@ -182,7 +182,7 @@ def _distances(
     model: ContactModel, configuration: Array, pairs: Iterable[int]
 ) -> tuple[Array, list[Array]]:
     """Distances of some pairs, and the closest point of the first body of each [m]."""
-    data, placed = model.workspace[0], model.measuring
+    data, placed, *_ = model.workspace
     pin.updateGeometryPlacements(model.arm.model, data, model.geometry, placed, configuration)
     found = [pin.computeDistance(model.geometry, placed, int(pair)) for pair in pairs]
     points = [np.array(each.getNearestPoint1()) for each in found]
