@@ -229,15 +229,12 @@ class Renderer:
         World, joints, goal, and offsets of obstacles that move.
         """
         pin.forwardKinematics(self._arm.model, self._data, configuration)
-        n_joints = self._arm.n_joints
-        poses = np.zeros((n_joints + 2 + len(self._motions), 3, 4))
-        poses[:, :, :3] = np.eye(3)
-        for joint in range(1, n_joints + 1):
-            poses[joint] = self._data.oMi[joint].homogeneous[:3]
-        poses[n_joints + 1] = goal_pose(self.problem.task.goal, goal)[:3]
-        for pose, motion in zip(poses[n_joints + 2 :], self._motions, strict=True):
-            pose[:, 3] = motion.offsets(np.array([time]))[0]
-        return poses
+        poses = [*(frame.homogeneous for frame in self._data.oMi)]
+        poses.append(goal_pose(self.problem.task.goal, goal))
+        for motion in self._motions:
+            poses.append(np.eye(4))
+            poses[-1][:3, 3] = motion.offsets(np.array([time]))[0]
+        return np.array(poses)[:, :3]
 
     def _faded(self, places: Array, colour: tuple[int, ...]) -> Layer:
         """Triangles on the floor, which fades into the background."""
@@ -273,14 +270,8 @@ def _single(meshes: Sequence[Mesh]) -> Mesh:
 def _lit(finish: Finish, places: Array, normals: Array, eye: Array, glow: Array) -> Array:
     """Colours of a surface's points, with opacity, from 0 to 255, shape (n, 4).
 
-    Parameters
-    ----------
-    finish
-        Of the surface.
-    places, normals : ndarray, shape (n, 3)
-        Points [m], and unit normals there.
-    eye, glow : ndarray, shape (3,)
-        Where the camera is [m], and light that the surface sends out.
+    Takes points and unit normals there, shape (n, 3) [m]; and where the camera is [m], and light
+    that the surface sends out, shape (3,).
     """
     colour, gloss = single(to_linear(channels(finish.colour))), 2 / finish.roughness**4
     mirror = 0.04 + (colour - 0.04) * finish.metalness
