@@ -161,13 +161,13 @@ class ContactShapes(NamedTuple):
             np.sqrt(np.square(body.corners - middle).sum(axis=1).max())
             for body, middle in zip(bodies, middles, strict=True)
         ]
+        exact = [isinstance(each.geometry, coal.Capsule | coal.Sphere) for each in objects]
+        exact += [each.excess == 0 for each in surroundings]
         inner = map(inner_capsule, objects)
         capsules = [np.append(each.corners, each.rounding) for each in inner]
-        capsules += [np.append(AXIS, 0.0 if each.exact else -np.inf) for each in surroundings]
+        capsules += [np.append(AXIS, 0.0 if same else -np.inf) for same in exact[len(objects) :]]
         outer = ((*each.corners, each.rounding) for each in map(outer_capsule, objects))
         around = [(*(a + b) / 2, *(b - a) / 2, radius) for a, b, radius in outer]
-        exact = [isinstance(each.geometry, coal.Capsule | coal.Sphere) for each in objects]
-        exact += [each.exact for each in surroundings]
         return cls(
             capsules=np.array(capsules, dtype=np.float64).reshape(-1, 7),
             around=np.array(around, dtype=np.float64).reshape(-1, 7),
@@ -208,8 +208,6 @@ class UnitBody(NamedTuple):
     ----------
     kind : int
         Kind of its pairs with shapes of the arm.
-    exact : bool
-        Whether it equals its capsule, box or half-space.
     corners : ndarray, shape (n, 3)
         Corners of its polytope.
     size : tuple of float
@@ -217,11 +215,10 @@ class UnitBody(NamedTuple):
     rounding : float
         What widens the polytope then [m].
     excess : float
-        See `ContactShapes.excess`.
+        See `ContactShapes.excess`; 0 if it equals its capsule, box or half-space.
     """
 
     kind: int
-    exact: bool
     corners: Array
     size: tuple[float, float, float]
     rounding: float
@@ -236,18 +233,18 @@ def unit_body(body: Body) -> UnitBody:
     """A body of the scene for the kernels."""
     if body.shape == "box":
         x, y, z = body.size
-        return UnitBody(WITH_BOX, True, CUBE, (x / 2, y / 2, z / 2), 0.0)
+        return UnitBody(WITH_BOX, CUBE, (x / 2, y / 2, z / 2), 0.0)
     if body.shape == "halfspace":
-        return UnitBody(WITH_HALFSPACE, True, np.zeros((1, 3)), (0.0, 0.0, 0.0), 0.0)
+        return UnitBody(WITH_HALFSPACE, np.zeros((1, 3)), (0.0, 0.0, 0.0), 0.0)
     if body.shape == "mesh":
         corners, rounding, excess = around(np.array(body.vertices), MANY)
-        return UnitBody(WITH_BOX, False, corners, (1.0, 1.0, 1.0), rounding, excess)
+        return UnitBody(WITH_BOX, corners, (1.0, 1.0, 1.0), rounding, excess)
     radius, length = (*body.size, 0.0)[:2]
     if body.shape == "cylinder":
         size = (radius, radius, length / 2)
-        return UnitBody(WITH_BOX, False, prism(1.0, 1.0), size, 0.0, np.inf)
+        return UnitBody(WITH_BOX, prism(1.0, 1.0), size, 0.0, np.inf)
     corners = np.array([AXIS[:3], AXIS[3:6]])
-    return UnitBody(BETWEEN_CAPSULES, True, corners, (0.0, 0.0, length / 2), radius)
+    return UnitBody(BETWEEN_CAPSULES, corners, (0.0, 0.0, length / 2), radius)
 
 
 def unit_boxes(bodies: Sequence[Body]) -> Array:

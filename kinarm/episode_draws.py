@@ -12,14 +12,7 @@ from kinarm.chain import Chain, quaternion_of
 from kinarm.errors import ProblemError
 from kinarm.kernels.compiling import Array
 from kinarm.kernels.placing import ATTEMPTS, draw_scenes
-from kinarm.kernels.plant import (
-    FORMER,
-    OFFSETS,
-    SUBSTEPS,
-    VELOCITY,
-    draw_plants,
-    plant_width,
-)
+from kinarm.kernels.plant import FORMER, OFFSETS, SUBSTEPS, VELOCITY, draw_plants, plant_width
 from kinarm.plant import RANGES
 from kinarm.problem import ReachProblem
 from kinarm.scene import Scene
