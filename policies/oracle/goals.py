@@ -6,11 +6,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kinarm.bodies import rotation_of_quaternion
-from kinarm.kernels.arriving import put_goal
-from kinarm.kernels.compiling import Array, Vector, kernel
+from kinarm.kernels.compiling import Array, Vector
 from kinarm.kernels.elementary import TURN
-from kinarm.kernels.goals import CONFIGURATION, DIRECTION, POSE, GoalRules, circle_points
-from kinarm.kernels.lanes import LANES, as_lanes, as_numbers
+from kinarm.kernels.goals import CONFIGURATION, DIRECTION, POSE, circle_points
 from kinarm.kernels.records import recorded
 from kinarm.policies.oracle.kernels.rotation import Turn
 from kinarm.simulator import Simulator
@@ -128,32 +126,11 @@ def stages_of(simulator: Simulator, starts: Array, goals: Array) -> list[Stage]:
     goal, rules = simulator.task.goal, simulator.world.rules.goal
     if not goal.changes:
         return [Stage(goals)]
-    drawn, stages = simulator.reset(starts, goals).pursuit.goals, []
-    for number in range(goal.sequence):
+    stages = []
+    for drawn in simulator.reset(starts, goals).pursuit.goals.swapaxes(0, 1):
         walks = None
         if goal.motion is not None:
-            walks = np.empty((len(goals), simulator.task.horizon + 1, goals.shape[1]))
-            follow_goals(rules, drawn, number, walks)
-        stages.append(Stage(drawn[:, number].copy(), walks))
+            walks = np.repeat(drawn[:, None], len(rules.moves), axis=1)
+            walks[:, :, :3] += rules.moves
+        stages.append(Stage(drawn.copy(), walks))
     return stages
-
-
-@kernel
-def follow_goals(goal: GoalRules, goals: Array, number: int, walks: Array) -> None:
-    """Fill in where goals are, shape (n, horizon + 1, goal_width).
-
-    Parameters
-    ----------
-    goal, goals, number
-        How goals change, those of all episodes, shape (n, n_goals, goal_width), and
-        which of them is followed.
-    walks : ndarray
-        What is filled in.
-    """
-    n, n_steps, width = walks.shape
-    present = as_lanes(np.zeros((1, width, LANES)))
-    for e in range(n):
-        for step in range(n_steps):
-            put_goal(e, step, number, 0, goal, goals, present)
-            for i in range(width):
-                walks[e, step, i] = as_numbers(present)[0, i, 0]
