@@ -21,14 +21,14 @@ from numpy.typing import NDArray
 
 from kinarm.chain import Chain, MotionBounds
 from kinarm.kernels.compiling import Array, Vector, helper, inlined
-from kinarm.kernels.kinematics import forward_kinematics, to_world
+from kinarm.kernels.kinematics import forward_kinematics, rotated, to_world
 from kinarm.kernels.lanes import select
 from kinarm.policies.oracle.kernels.rotation import (
     Turn,
     length_of,
     plus_axes,
     share_within,
-    third_order_of_axes,
+    turned_by,
 )
 
 SWEEPS = 3
@@ -177,7 +177,10 @@ def curved_bound(
     remainder = third_order(chain.prismatic, curvature, half)
     if rows > 0:
         share = math.sqrt(x * x + y * y + z * z)
-        remainder = share * remainder + (1.0 - share) * third_order_of_axes(turn, half)
+        # No derivative of the axes is longer than they are.
+        total = turned_by(turn, half)
+        of_axes = turn.weight * total * total * total / 6.0
+        remainder = share * remainder + (1.0 - share) * of_axes
         for k in range(rows):
             aside[k] = scale * aside[k]
             bound += aside[k] * apart[k]
@@ -191,10 +194,8 @@ def curved_bound(
         if not chain.prismatic[i]:
             # The second derivative by a joint and a later one is the cross product of the first
             # one's axis with the other's motion.
-            c, ax, ay, az = i + 1, chain.axis[i, 0], chain.axis[i, 1], chain.axis[i, 2]
-            wx = poses[c, 4] * ax + poses[c, 5] * ay + poses[c, 6] * az
-            wy = poses[c, 7] * ax + poses[c, 8] * ay + poses[c, 9] * az
-            wz = poses[c, 10] * ax + poses[c, 11] * ay + poses[c, 12] * az
+            ax, ay, az = chain.axis[i, 0], chain.axis[i, 1], chain.axis[i, 2]
+            wx, wy, wz = rotated(poses, i + 1, ax, ay, az)
             tx, ty, tz = y * wz - z * wy, z * wx - x * wz, x * wy - y * wx
             second = tx * jacobian[0, i] + ty * jacobian[1, i] + tz * jacobian[2, i]
             for k in range(0, rows, 3):

@@ -33,13 +33,9 @@ def distance_from_box(beyond: Vector) -> float:
 
 
 @inlined
-def excess_over_box(point: Vector, lower: Vector, upper: Vector) -> Vector:
-    """How far a point is beyond a box, per axis; negative between its faces."""
-    return (
-        max(lower[0] - point[0], point[0] - upper[0]),
-        max(lower[1] - point[1], point[1] - upper[1]),
-        max(lower[2] - point[2], point[2] - upper[2]),
-    )
+def excess_over_box(point: Vector, half: Vector) -> Vector:
+    """How far a point is beyond a box about the origin, per axis; negative between its faces."""
+    return abs(point[0]) - half[0], abs(point[1]) - half[1], abs(point[2]) - half[2]
 
 
 @inlined
@@ -53,13 +49,13 @@ def along(a: Vector, b: Vector, share: float) -> Vector:
 
 
 @inlined
-def deepest_share(a: Vector, b: Vector, lower: Vector, upper: Vector) -> float:
-    """Where the segment ab is deepest in a box, or closest: the best of a few."""
-    share = closest_to_box(a, b, lower, upper)
-    least = distance_from_box(excess_over_box(along(a, b, share), lower, upper))
+def deepest_share(a: Vector, b: Vector, half: Vector) -> float:
+    """Where the segment ab is deepest in a box about the origin, or closest: the best of a few."""
+    share = closest_to_box(a, b, (-half[0], -half[1], -half[2]), half)
+    least = distance_from_box(excess_over_box(along(a, b, share), half))
     for k in range(TRIED):
         tried = along(a, b, k / (TRIED - 1))
-        distance = distance_from_box(excess_over_box(tried, lower, upper))
+        distance = distance_from_box(excess_over_box(tried, half))
         share = select(distance < least, k / (TRIED - 1), share)
         least = min(distance, least)
     return share
@@ -119,16 +115,14 @@ def overlaps(
         frame, none = bodies[j, 2], 0.0 * poses[0, 13]
         nx, ny, nz, offset = surface(poses, frame)
         if kind == WITH_BOX:
-            hx, hy, hz = poses[frame, 0], poses[frame, 1], poses[frame, 2]
-            lower, upper = (-hx, -hy, -hz), (hx, hy, hz)
+            size = poses[frame, 0], poses[frame, 1], poses[frame, 2]
             c, d = to_frame(poses, frame, a), to_frame(poses, frame, b)
-            centre = excess_over_box(along(c, d, 0.5), lower, upper)
-            apart = distance_from_box(centre) >= radius + reach
+            apart = distance_from_box(excess_over_box(along(c, d, 0.5), size)) >= radius + reach
             if not any_lane(wanted & ~proven & ~apart):
                 continue
-            deepest = deepest_share(c, d, lower, upper)
+            deepest = deepest_share(c, d, size)
             point = along(a, b, deepest)
-            x, y, z = excess_over_box(along(c, d, deepest), lower, upper)
+            x, y, z = excess_over_box(along(c, d, deepest), size)
         else:
             start, end = nx * a[0] + ny * a[1] + nz * a[2], nx * b[0] + ny * b[1] + nz * b[2]
             first = start < end

@@ -107,13 +107,6 @@ def turned_by(turn: Turn, half: Array) -> float:
     return total
 
 
-@inlined
-def third_order_of_axes(turn: Turn, half: Array) -> float:
-    """Bound of what is of third order in a box [m]: no derivative is longer than the axes."""
-    total = turned_by(turn, half)
-    return turn.weight * total * total * total / 6.0
-
-
 @helper
 def angle_bound(turn: Turn, length: float, half: Array) -> float:
     """Lower bound of the axes' length over a box: the angle at its centre less the half-widths [m].
