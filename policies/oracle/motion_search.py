@@ -198,9 +198,13 @@ class MotionSearch:
 
     def _replay(self, trials: NDArray[np.int64], actions: Array) -> None:
         """Run motions in the simulator, and keep those better than before."""
-        simulator, taken = self.simulator, self.taken[trials]
+        simulator, taken, later = self.simulator, self.taken[trials], actions
+        if taken.any():  # their first steps are those of motions before, and their ends are lost
+            later = np.zeros_like(actions)
+            for row, steps in enumerate(taken.tolist()):
+                later[row, steps:] = actions[row, : actions.shape[1] - steps]
         begun = self.starts[trials], self.stage.goals[trials]
-        outcome = simulator.rollout_actions(delayed(actions, taken), *begun, taken=taken)
+        outcome = simulator.rollout_actions(later, *begun, taken=taken)
         missed = np.where(outcome.collision, np.inf, MISS_COST + outcome.distance)
         steps = outcome.steps - taken - (simulator.task.goal.hold - 1)
         costs = np.where(outcome.success, steps, missed)
@@ -210,22 +214,6 @@ class MotionSearch:
         self.actions[trials[better]] = actions[better]
         self.costs[trials[better]] = costs[better]
         self.ends[trials[better]] = outcome.configurations[better]
-
-
-def delayed(actions: Array, taken: NDArray[np.int64]) -> Array:
-    """Motions that begin after some steps, shape (n, horizon, n_actions); their ends are lost.
-
-    Parameters
-    ----------
-    actions, taken : ndarray, shape (n, horizon, n_actions) and (n,)
-        The motions, and the steps before them, in which nothing is done.
-    """
-    if not taken.any():
-        return actions
-    later = np.zeros_like(actions)
-    for row, steps in enumerate(taken.tolist()):
-        later[row, steps:] = actions[row, : actions.shape[1] - steps]
-    return later
 
 
 def two_segments(

@@ -124,6 +124,9 @@ class Oracle:
             first = self.simulator.problem.replace(goal=replace(goal, sequence=1))
             self._single = Simulator(first, threads=threads).shielded(False)
         self._prover = Prover(self._single.without_moving_bodies())
+        # Steps for which a goal is to be held after the first one, and the last that can be first.
+        self._rest = goal.hold - 1
+        self._last = self.simulator.task.horizon - self._rest
 
     def __repr__(self) -> str:
         return f"Oracle({self.simulator.problem!r})"
@@ -206,16 +209,6 @@ class Oracle:
             paths=replay.paths,
             reasons=np.array(np.where(replay.success, "", reasons), dtype=np.str_),
         )
-
-    @property
-    def _rest(self) -> int:
-        """Steps for which a goal is to be held after the first one."""
-        return self.simulator.task.goal.hold - 1
-
-    @property
-    def _last(self) -> int:
-        """Last step in which a goal can be reached first."""
-        return self.simulator.task.horizon - self._rest
 
     def _search(self, search: MotionSearch) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
         """Bound the first step at goals, and look for motions that take few more."""
