@@ -23,16 +23,14 @@ HIDDEN_GAIN, ACTOR_GAIN, CRITIC_GAIN = 2.0**0.5, 0.01, 1.0
 """Factors of orthogonal initial weights, as in Stable-Baselines3."""
 
 Vector = NDArray[Any]
-Affine = tuple[Vector, Vector]
-"""Weights, shape (n_out, n_in), and bias, shape (n_out,)."""
 
 
 class Parameters(NamedTuple):
     """Parts of a vector: logarithms of the deviations, and layers."""
 
     log_std: Vector
-    actor: list[Affine]
-    critic: list[Affine]
+    actor: list[Layer]
+    critic: list[Layer]
 
 
 def _shapes(widths: Sequence[int]) -> list[tuple[int, int]]:
@@ -63,7 +61,7 @@ def split_parameters(vector: Vector, widths: Sequence[int]) -> Parameters:
         raise InvalidInputError(f"expected a state of {sum(sizes)} parameters, got {len(vector)}")
     log_std, *parts = np.split(vector, np.cumsum(sizes)[:-1])
     layers = [
-        (weights.reshape(n_out, n_in), bias)
+        Layer(weights.reshape(n_out, n_in), bias)
         for (n_in, n_out), weights, bias in zip(shapes, parts[::2], parts[1::2], strict=True)
     ]
     count = len(widths) - 2
@@ -141,7 +139,7 @@ class ActorCritic:
         self.actor, self.critic = (Network(table, *given) for table in tables)
 
     def _place(
-        self, layers: list[Affine], first: int, turned: int
+        self, layers: list[Layer], first: int, turned: int
     ) -> tuple[NDArray[np.int64], int, int]:
         """Lay out a network behind earlier ones; returns new ends of the arrays."""
         rows, inputs = [], 0
@@ -194,7 +192,7 @@ def actor_policy(config: PPOConfig, state: PPOState) -> Policy:
     return Policy(
         mean=state.normalizer.mean,
         std=state.normalizer.std,
-        layers=tuple(Layer(*affine) for affine in actor),
+        layers=tuple(actor),
         provenance=Provenance.of("ppo", config, state.environment_steps),
         mirror=problem_mirror(config.problem) if config.symmetric else None,
         residual=config.residual,
