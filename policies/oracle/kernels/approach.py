@@ -52,10 +52,6 @@ STEP_ROUNDING = 2.0**-51
 """Most that a step rounds a joint's position by, as a share of its largest one."""
 
 
-Boxes = Any
-"""Record of a `layout`."""
-
-
 @cache
 def layout(n: int, n_joints: int, n_placed: int, n_axes: int) -> Layout:
     """Work space for boxes of the first n joints, in a scene of ``n_placed`` bodies.
@@ -115,7 +111,7 @@ def within_steps(
 
 
 @inlined
-def halve(stack: Array, row: int, lane: int, boxes: Boxes) -> bool:
+def halve(stack: Array, row: int, lane: int, boxes: Any) -> bool:
     """Put the halves of a lane's box into the stack, that of the point tried on top.
 
     It is cut across the joint that moves the tool farthest. Returns whether it is large enough.
@@ -159,7 +155,7 @@ def search(
     upper: Array,
     best: Array,
     stack: Array,
-    block: Boxes,
+    block: Any,
 ) -> tuple[bool, int]:
     """Search for the configuration close enough to a goal in the fewest steps.
 
@@ -187,7 +183,7 @@ def search(
     best : ndarray, shape (n_joints,)
         Filled with the configuration found; joints beyond the n-th stay as at
         the start.
-    stack, block : ndarray, shape (WAITING, 2 n), and Boxes
+    stack, block : ndarray, shape (WAITING, 2 n), and record of a `layout`
         Work space.
 
     Returns

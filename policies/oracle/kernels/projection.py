@@ -26,10 +26,6 @@ DAMPING = 1e-4
 """Added to the diagonal of J J^T, to limit steps near singularities [m^2]."""
 
 
-Moving = Any
-"""Record of a `layout`."""
-
-
 @cache
 def layout(n_joints: int, n: int, n_axes: int) -> Layout:
     """Configurations in lanes, of which the first n joints move, for axes of the tool or none."""
@@ -83,7 +79,7 @@ def damped_step(jacobian: Array, vector: Vector, step: Array) -> None:
 def damped_least_squares(
     first: int,
     last: int,
-    moving: Moving,
+    moving: Any,
     chain: Chain,
     owner: NDArray[np.int64],
     lower: Array,
@@ -102,7 +98,7 @@ def damped_least_squares(
     Parameters
     ----------
     first, last, moving, chain
-        Range of the rows, work space, and the arm.
+        Range of the rows, record of a `layout` as work space, and the arm.
     owner, radius : ndarray, shape (n_rows,)
         Row of goals and limits for each, and distance at which to stop [m].
     lower, upper, goals : ndarray, shape (n_goals, n) twice and (n_goals, 3)
@@ -120,7 +116,7 @@ def damped_least_squares(
     # The numbers in the lanes.
     radii, directions = as_numbers(moving.radius), as_numbers(moving.wanted)
     found, iterations = as_numbers(moving.distance), as_numbers(moving.iteration)
-    waiting, n_moving, free = first, 0, (1 << LANES) - 1
+    waiting, free = first, (1 << LANES) - 1
     while True:
         # Put the next rows into lanes that are free.
         for lane in range(LANES if waiting < last else 0):
@@ -136,9 +132,8 @@ def damped_least_squares(
                 radii[0, lane] = radius[waiting]
                 iterations[0, lane] = 0.0
                 waiting += 1
-                n_moving += 1
                 free &= ~(1 << lane)
-        if n_moving == 0:
+        if free == (1 << LANES) - 1:
             return
         # Measure the distance to the goal, and take out what is close enough.
         forward_kinematics(chain, moving.q, 0, poses)
@@ -157,7 +152,6 @@ def damped_least_squares(
             if ended_bits >> lane & 1:
                 take(moving.q, 0, lane, configurations, rows[lane])
                 distances[rows[lane]] = found[0, lane]
-                n_moving -= 1
         free |= ended_bits
         # Aimed at half the radius, a short step still arrives. What has ended stays.
         share = select(ended, 0.0, 1.0 - 0.5 * moving.radius[0] / distance)
