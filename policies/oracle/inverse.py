@@ -31,7 +31,7 @@ def solve_within(
     starts: Array,
     goals: Array,
     steps: NDArray[np.int64],
-    tolerances: Array,
+    tolerance: float | Array,
     guesses: Array,
     samples: int,
 ) -> Solutions:
@@ -45,8 +45,8 @@ def solve_within(
         Where the arm is, and likely solutions [rad or m].
     goals : ndarray, shape (m, goal_width)
         The goals, their positions first [m].
-    steps, tolerances : ndarray of int and of float, shape (m,)
-        Most steps from the starts, and largest distances from the goals [m];
+    steps, tolerance : ndarray of int, shape (m,), and float or ndarray, shape (m,)
+        Most steps from the starts, and largest distance from the goals [m];
         rotations have a tolerance in the same ratio to the task's.
     samples : int
         Configurations to begin from: start, guess, and evenly spread ones.
@@ -64,7 +64,7 @@ def solve_within(
     beginnings[:, 0] = starts
     beginnings[:, :, moved] = np.clip(beginnings[:, :, moved], lower, upper)
     owner = np.repeat(np.arange(m), samples)
-    allowed = (tolerances * (1.0 - RESERVE))[owner]
+    allowed = np.full(m, tolerance * (1.0 - RESERVE))[owner]
     radius, configurations = allowed * np.tile(shares, m), beginnings.reshape(-1, n_joints)
     distances, wanted = np.empty(len(owner)), (aims.position, recorded(aims.turn), aims.wanted)
     arrays = (simulator.world.records[0], owner, *box, *wanted, radius, configurations, distances)

@@ -99,8 +99,7 @@ class MotionSearch:
             rows, steps = rows[due], steps[due]
             if rows.size == 0:
                 return
-            tolerances = np.full(rows.size, self.simulator.task.tolerance)
-            solutions = self._try_straight(rows, steps, tolerances, samples)
+            solutions = self._try_straight(rows, steps, 0.0, samples)
             np.minimum.at(self.solved, rows[solutions.owner], steps[solutions.owner])
         self._try_vias(rows, steps, solutions, np.flatnonzero(~self.reached[rows] & (steps > 1)))
 
@@ -132,9 +131,8 @@ class MotionSearch:
     def _ends(self, row: int) -> Array:
         """Distinct configurations at a trial's goal without contact, the soonest reached first."""
         start, goal = self.starts[row, None], self.stage.goals[row, None]
-        task = self.simulator.task
-        most, tolerance = np.array([task.horizon]), np.array([task.tolerance])
-        found, _ = solve_within(self._resting, start, goal, most, tolerance, start, BEGINNINGS)
+        most, within = np.array([self.simulator.task.horizon]), self.simulator.task.tolerance
+        found, _ = solve_within(self._resting, start, goal, most, within, start, BEGINNINGS)
         order = steps_between(self.simulator, start, found).argsort(kind="stable")
         remaining, distinct = found[order], []
         while len(remaining):
@@ -150,21 +148,21 @@ class MotionSearch:
             if rows.size == 0:
                 return
             steps = np.fmax(self.left[rows], 1)
-            tolerances = np.full(rows.size, self.simulator.task.tolerance + farther)
-            solutions = self._try_straight(rows, steps, tolerances, SAMPLES[-1])
+            solutions = self._try_straight(rows, steps, farther, SAMPLES[-1])
             due = np.isinf(self.costs[rows]) & (steps > 1)
             self._try_vias(rows, steps, solutions, np.flatnonzero(due))
 
     def _try_straight(
-        self, rows: NDArray[np.int64], steps: NDArray[np.int64], tolerances: Array, samples: int
+        self, rows: NDArray[np.int64], steps: NDArray[np.int64], farther: float, samples: int
     ) -> Solutions:
-        """Try straight motions to the goals; owners count in ``rows``."""
+        """Try straight motions to the goals, or so much farther [m]; owners count in ``rows``."""
         starts, goals, guesses = self.starts[rows], self.stage.goals[rows], self.witnesses[rows]
         if self.stage.walks is not None:
             # The middle of the steps in which the goal is to be held.
             middle = steps + (self.simulator.task.goal.hold - 1) // 2
             goals = self.stage.walks[rows, middle]
-        found = solve_within(self._resting, starts, goals, steps, tolerances, guesses, samples)
+        within = self.simulator.task.tolerance + farther
+        found = solve_within(self._resting, starts, goals, steps, within, guesses, samples)
         owner, ends = found.owner, found.configurations
         due = steps[owner]
         motions = two_segments(self.simulator, starts[owner], ends, ends, due, due)
