@@ -32,14 +32,6 @@ class Tree:
         """The configurations, shape (n, n_joints) [rad or m]."""
         return self._nodes[: len(self.parents)]
 
-    def add(self, node: Array, parent: int) -> int:
-        """Append a node and return its index."""
-        if len(self.parents) == len(self._nodes):
-            self._nodes = np.concatenate([self._nodes, np.empty_like(self._nodes)])
-        self._nodes[len(self.parents)] = node
-        self.parents.append(parent)
-        return len(self.parents) - 1
-
     def extend(self, motions: Motions, sample: Array, longest: float) -> int | None:
         """Grow towards a sample, as far as nothing touches; return the node there."""
         closest = int(motions.durations(self.nodes, sample).argmin())
@@ -51,8 +43,12 @@ class Tree:
         share = motions.free_share(origin, towards, asking=self.parents[closest] < 0)
         if share == 0.0:
             return None
+        if len(self.parents) == len(self._nodes):
+            self._nodes = np.concatenate([self._nodes, np.empty_like(self._nodes)])
         reached = towards if share == 1.0 else origin + share * (towards - origin)
-        return self.add(reached, closest)
+        self._nodes[len(self.parents)] = reached
+        self.parents.append(closest)
+        return len(self.parents) - 1
 
     def path_to_root(self, node: int) -> list[Array]:
         """Nodes from this one to its root."""
