@@ -34,8 +34,8 @@ WHOLE = ""
 class Clip(NamedTuple):
     """Finite limits, for all values or for each: shape () or (n,)."""
 
-    low: NDArray[np.float64]
-    high: NDArray[np.float64]
+    low: NDArray[np.float64] | np.float64
+    high: NDArray[np.float64] | np.float64
 
 
 Piece = Layer | Clip | Activation
@@ -139,9 +139,7 @@ def module_pieces(module: Any) -> Iterator[Piece]:
     elif kind is nn.LeakyReLU and module.negative_slope == 0.01:
         yield "leaky_relu"
     elif kind in (nn.Hardtanh, nn.ReLU6):
-        low, high = float(module.min_val), float(module.max_val)
-        usual = (low, high) == (-1.0, 1.0)
-        yield "hardtanh" if usual else Clip(np.array(low), np.array(high))
+        yield Clip(np.float64(module.min_val), np.float64(module.max_val))
     elif kind is nn.Dropout and (not module.training or module.p == 0.0):
         return  # it drops nothing
     elif kind not in (nn.Flatten, nn.Identity):

@@ -92,11 +92,9 @@ def choose(
     wider = exponential(max(0.0, least - log_std.mean()))
     for i in range(means.shape[0]):
         scales[i] = wider if noisy[i] else 1.0
-        scale = float(scales[i])
+        scale, density = float(scales[i]), 0.0
         for j in range(means.shape[1]):
             actions[i, j] = means[i, j] + scale * exponential(float(log_std[j])) * noise[i, j]
-        density = 0.0
-        for j in range(means.shape[1]):
             deviation = (float(actions[i, j]) - means[i, j]) / scale
             density += log_density(deviation, precision[j], log_std[j])
         densities[i] = density
