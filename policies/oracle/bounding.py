@@ -122,5 +122,4 @@ class Prover:
             moved = np.abs(after.goals - before.goals)[:, 3 : 3 + n]
             steps = np.fmax(steps, ((moved - turn) / limits).max(axis=1))
         steps = np.clip(steps - SMALLEST, 1.0, simulator.task.horizon + 1.0)
-        fewest: NDArray[np.int64] = np.ceil(steps).astype(np.int64)
-        return fewest
+        return np.asarray(np.ceil(steps), dtype=np.int64)

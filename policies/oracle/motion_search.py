@@ -89,8 +89,7 @@ class MotionSearch:
     @property
     def steps(self) -> NDArray[np.int64]:
         """Steps of the motions, shape (n,); the horizon + 1 for a miss."""
-        steps: NDArray[np.int64] = np.fmin(self.costs, self.simulator.task.horizon + 1).astype(int)
-        return steps
+        return np.asarray(np.fmin(self.costs, self.simulator.task.horizon + 1), dtype=np.int64)
 
     def try_steps(self, rows: NDArray[np.int64], steps: NDArray[np.int64]) -> None:
         """Look for motions of so many steps where none reaches the goal yet."""

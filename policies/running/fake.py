@@ -56,8 +56,7 @@ class FakeArm(SimulatedArm):
     def read(self) -> Array:
         """Where sensors have the joints."""
         seen = self._episodes.sensed if len(self._episodes.sensed) else self._episodes.q
-        positions: Array = seen[0].copy()
-        return positions
+        return np.array(seen[0])
 
     def command(self, positions: Array) -> None:
         """Send the joints to positions, as fast as they can."""
