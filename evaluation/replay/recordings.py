@@ -3,6 +3,7 @@
 from collections import Counter
 from collections.abc import Collection, Sequence
 from dataclasses import replace
+from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
 from kinarm._fields import to_plain
@@ -80,13 +81,6 @@ def record(
     )
 
 
-class Candidates(NamedTuple):
-    """Trials to choose from, and their set if they are run now and the oracle is to be asked."""
-
-    trials: list[Trial]
-    bounded: TrialSet | None = None
-
-
 class Chosen(NamedTuple):
     """Recordings that are played.
 
@@ -107,44 +101,40 @@ class Chosen(NamedTuple):
 
 def chosen_recordings(request: "ReplayRequest") -> Chosen:
     """The recordings of a request, with bounds; the first policy decides."""
-    candidates = _find_candidates(request)
-    trials = candidates.trials
+    file = request.source
+    trials, bounded = _run_trials(request) if file is None else (_read(file, request.arm), None)
     if request.failures:
-        return _failures(candidates)
+        return _failures(trials, bounded)
     if request.trial:
-        chosen = _numbered(trials, request.trial)
+        trials = _numbered(trials, request.trial)
     elif request.worst is not None:
-        chosen = _worst(trials, request.worst)
-    else:
-        chosen = trials
-    return Chosen(_with_bounds(candidates, chosen))
+        trials = _worst(trials, request.worst)
+    return Chosen(_with_bounds(trials, bounded))
 
 
-def _find_candidates(request: "ReplayRequest") -> Candidates:
-    """Make or read the recordings to choose from."""
-    if request.source is None:
-        names = request.compare or ((request.policy,) if request.policy else ())
-        if not names:
-            raise InvalidInputError("name a --policy, or a file of recordings")
-        return _fresh_candidates(request, names)
-    found, arm = load_recordings(request.source), request.arm
+def _read(file: Path, arm: str | None) -> list[Trial]:
+    """Read the recordings to choose from."""
+    found = load_recordings(file)
     if not found:
-        raise InvalidInputError(f"{str(request.source)!r} holds no recording")
+        raise InvalidInputError(f"{str(file)!r} holds no recording")
     if arm is not None:  # where their URDF lies now
         moved = (each.problem.replace(arm=replace(each.problem.arm, source=arm)) for each in found)
         found = [replace(each, problem=new) for each, new in zip(found, moved, strict=True)]
-    return Candidates([(each,) for each in found])
+    return [(each,) for each in found]
 
 
-def _fresh_candidates(request: "ReplayRequest", names: Sequence[str]) -> Candidates:
-    """Run policies on trials that are drawn now."""
+def _run_trials(request: "ReplayRequest") -> tuple[list[Trial], TrialSet | None]:
+    """Run policies on trials that are drawn now; these as well if the oracle is to be asked."""
+    names = request.compare or ((request.policy,) if request.policy else ())
+    if not names:
+        raise InvalidInputError("name a --policy, or a file of recordings")
     contestants, problem = named_contestants(request, names)
     searched = request.trial or request.worst
     count = request.trials or (FAILING if request.failures else SEARCHED if searched else PLAYED)
     trials = TrialSet.draw(problem, count, request.seed or 0)
     other = request.allow_other_arm
     runs = [record(contestant, trials, allow_other_arm=other) for contestant in contestants]
-    return Candidates(list(zip(*runs, strict=True)), trials if request.oracle else None)
+    return list(zip(*runs, strict=True)), trials if request.oracle else None
 
 
 def named_contestants(
@@ -170,22 +160,22 @@ def named_contestants(
     return contestants, request.resolve(trained[0])
 
 
-def _with_bounds(candidates: Candidates, chosen: Sequence[Trial]) -> list[list[Recording]]:
+def _with_bounds(trials: Sequence[Trial], bounded: TrialSet | None) -> list[list[Recording]]:
     """Recordings by policy, with lower bounds if the oracle is asked."""
-    runs = [list(run) for run in zip(*chosen, strict=True)]
-    if candidates.bounded is None:
+    runs = [list(run) for run in zip(*trials, strict=True)]
+    if bounded is None:
         return runs
     numbers = [recording.trial for recording in runs[0]]
-    bounds = oracle_bounds(candidates.bounded.chosen(numbers)).steps_lower_bound.tolist()
+    bounds = oracle_bounds(bounded.chosen(numbers)).steps_lower_bound.tolist()
     return [
         [replace(each, steps_lower_bound=n) for each, n in zip(run, bounds, strict=True)]
         for run in runs
     ]
 
 
-def _failures(candidates: Candidates) -> Chosen:
+def _failures(trials: Sequence[Trial], bounded: TrialSet | None) -> Chosen:
     """All trials that failed, in groups by cause, beside the oracle."""
-    first, total = [trial[0] for trial in candidates.trials], len(candidates.trials)
+    first, total = [trial[0] for trial in trials], len(trials)
     ends = zip(*((each.outcome, each.steps, each.contact) for each in first), strict=True)
     found = failure_causes(*ends)
     if not found:
@@ -195,18 +185,17 @@ def _failures(candidates: Candidates) -> Chosen:
             f"{len(found)} of {total} trials failed, a page holds {MOST_FAILURES} at most: ask for "
             "fewer --trials"
         )
-    failed, causes = list(found), list(map(str, found.values()))
-    frequency = Counter(causes)
-    order = sorted(range(len(causes)), key=lambda k: (-frequency[causes[k]], causes[k]))
-    trials = [candidates.trials[failed[k]] for k in order]
-    runs = _with_bounds(candidates, trials)
-    if len(runs) == 1 and candidates.bounded is not None:
+    causes = {number: str(cause) for number, cause in found.items()}
+    frequency = Counter(causes.values())
+    order = sorted(causes, key=lambda number: (-frequency[causes[number]], causes[number]))
+    runs = _with_bounds([trials[number] for number in order], bounded)
+    if len(runs) == 1 and bounded is not None:
         numbers = [recording.trial for recording in runs[0]]
-        ghosts = record(ORACLE, candidates.bounded.chosen(numbers), allow_other_arm=True)
+        ghosts = record(ORACLE, bounded.chosen(numbers), allow_other_arm=True)
         runs.append([replace(each, trial=numbers[each.trial]) for each in ghosts])
     policy, problem = first[0].policy, first[0].problem.name
     heading = f"{policy}: {len(causes)} of {total} trials of {problem} failed"
-    return Chosen(runs, [causes[k] for k in order], heading)
+    return Chosen(runs, [causes[number] for number in order], heading)
 
 
 def _numbered(trials: Sequence[Trial], wanted: Collection[int]) -> list[Trial]:
