@@ -23,7 +23,7 @@ from kinarm.evaluation.experiments.plan import Run
 from kinarm.evaluation.trials import trial_set
 from kinarm.policies.checkpoint import CHECKPOINT_SECONDS, rebuilt, save_checkpoint
 from kinarm.policies.learners import CurvePoint as IterationPoint
-from kinarm.policies.learners import state_policy, training_states
+from kinarm.policies.learners import TrainingState, state_policy, training_states
 from kinarm.policies.policy import Policy, policy_content, policy_of_content
 
 ARCHIVE = ("study run", 1)
@@ -102,21 +102,15 @@ class TrainedRun:
         return timed
 
 
-class Start(NamedTuple):
-    """Where a training goes on: its state and its learning curve so far."""
-
-    state: Any
-    curve: CurveSoFar
-
-
 class Task(NamedTuple):
-    """A training for an executor, from its start, None for the beginning.
+    """A training for an executor, from its state and learning curve, None for the beginning.
 
-    It saves its state in the checkpoint, if there is one and its folder exists.
+    It saves both in the checkpoint, if there is one and its folder exists.
     """
 
     run: Run
-    start: Start | None = None
+    state: Any = None
+    curve: CurveSoFar = CurveSoFar()
     checkpoint: Path | None = None
 
 
@@ -144,12 +138,12 @@ def train(task: Task, threads: int = 1) -> TaskResult:
     task, threads : Task and int
         The training, and its number of threads.
     """
-    run, start, checkpoint = task
+    run, begun, so_far, checkpoint = task
     config = run.config
-    curve = Curve(config, run.trials, start.curve if start else CurveSoFar())
-    states = curve.timed(training_states(config, start and start.state, threads))
+    curve = Curve(config, run.trials, so_far)
+    states = curve.timed(training_states(config, begun, threads))
     state = next(states)
-    if start is None:
+    if begun is None:
         curve.update(state)
     place = checkpoint if checkpoint is not None and checkpoint.parent.is_dir() else None
     saved = time.monotonic()
@@ -159,28 +153,28 @@ def train(task: Task, threads: int = 1) -> TaskResult:
             save_checkpoint(place, config, state, curve.so_far())
             saved = time.monotonic()
     so_far = curve.so_far()
-    return TaskResult(_run_content(run, Start(state, so_far)), so_far.clock, state.curve)
+    return TaskResult(_run_content(run, state, so_far), so_far.clock, state.curve)
 
 
-def _run_content(run: Run, end: Start) -> bytes:
+def _run_content(run: Run, state: TrainingState, curve: CurveSoFar) -> bytes:
     """Content of the file of a training; equal ones give equal bytes."""
-    policy, trials = state_policy(run.config, end.state), run.trials
+    policy, trials = state_policy(run.config, state), run.trials
     faced = trial_set(run.config.problem, trials.count, trials.seed)
     rollouts = faced.simulator.rollout(policy, faced.starts, faced.goals)
     content = policy_content(policy)
     arrays = {
-        "curve": np.array(end.curve.points, dtype=float).reshape(-1, len(CurvePoint._fields)),
+        "curve": np.array(curve.points, dtype=float).reshape(-1, len(CurvePoint._fields)),
         **{OUTCOMES + name: getattr(rollouts, name) for name in TrialOutcomes._fields},
         **{POLICY + name: array for name, array in content.arrays.items()},
     }
     if trials.curve is not None:
-        arrays["returns"] = np.array([point.mean_return for point in end.state.curve])
-        arrays["curve_distance"] = end.curve.distances
+        arrays["returns"] = np.array([point.mean_return for point in state.curve])
+        arrays["curve_distance"] = curve.distances
     # Where a file was made must not tell in its bytes.
     made = {**content.header["provenance"], "versions": {}, "commit": ""}
     header = {
         "settings": run.settings,
-        "last": CurvePoint.of(end.state, rollouts)._asdict(),
+        "last": CurvePoint.of(state, rollouts)._asdict(),
         "policy": {**content.header, "provenance": made},
     }
     file = io.BytesIO()

@@ -16,7 +16,7 @@ from kinarm.evaluation.experiments.curve import CurveSoFar, Made
 from kinarm.evaluation.experiments.executors import Failure
 from kinarm.evaluation.experiments.experiment import Experiment
 from kinarm.evaluation.experiments.plan import Run
-from kinarm.evaluation.experiments.runs import Start, TaskResult, TrainedRun, load_run
+from kinarm.evaluation.experiments.runs import TaskResult, TrainedRun, load_run
 from kinarm.policies.checkpoint import Progress, load_beside, load_checkpoint, load_progress
 from kinarm.policies.provenance import package_versions, source_commit
 
@@ -100,12 +100,12 @@ class Store:
                 found[run] = load_run(self.path("runs", run), run, self.made(run))
         return found
 
-    def start(self, run: Run) -> Start | None:
-        """Where a training goes on that was interrupted."""
+    def start(self, run: Run) -> tuple[Any, CurveSoFar]:
+        """State and curve with which an interrupted training goes on; None for the beginning."""
         path = self.path("checkpoints", run)
         with suppress(KinarmError):
-            return Start(load_checkpoint(path).state, load_beside(path, CurveSoFar))
-        return None
+            return load_checkpoint(path).state, load_beside(path, CurveSoFar)
+        return None, CurveSoFar()
 
     def progress(self, runs: Iterable[Run]) -> list[Progress]:
         """How far trainings under way are, by their checkpoints."""

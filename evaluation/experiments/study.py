@@ -154,7 +154,7 @@ class Study:
         # Trainings that several entries share come once.
         distinct = tuple({run.key: run for run in runs}.values())
         tasks = [
-            Task(run, self.store.start(run), absolute(self.store.path("checkpoints", run)))
+            Task(run, *self.store.start(run), absolute(self.store.path("checkpoints", run)))
             for run in distinct
         ]
         failures, done = dict[str, str](), list[str]()

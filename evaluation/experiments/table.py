@@ -82,10 +82,7 @@ class Group:
     def estimates(self) -> dict[str, Estimate]:
         """The figures of merit over all seeds; success has an interval."""
         outcomes = Outcomes(tuple(run.outcomes for run in self.runs), self.bounds)
-        known = {
-            name: Estimate(None if math.isnan(value) else value)
-            for name, value in figures_of(outcomes).items()
-        }
+        known = {name: Estimate(_known(value)) for name, value in figures_of(outcomes).items()}
         return {**known, "success": self.success}
 
     @property

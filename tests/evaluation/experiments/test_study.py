@@ -122,7 +122,7 @@ class TestGoingOn:
         assert "success 0 %, stopped" in study.status()[0]
         executor = Counting()
         study.run(executor=executor)
-        assert [task.start.state.iteration for task in executor.tasks] == [2]
+        assert [task.state.iteration for task in executor.tasks] == [2]
         assert contents(study.store.folder) == contents(straight.store.folder)
         assert list(study.store.folder.glob("checkpoints/*")) == []
 
