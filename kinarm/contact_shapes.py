@@ -55,8 +55,8 @@ class ContactShapes(NamedTuple):
     pairs : ndarray of int, shape (n_pairs, 3)
         Kind, index of a moving shape of the arm, and index of the other shape.
     travel : ndarray, shape (n_joints, n_pairs)
-        Bound on how far a joint moves the bodies of a pair relative to each
-        other [m/rad, or m/m].
+        Bound on how far a joint moves the shapes of a pair relative to each
+        other [m/rad, or m/m]; of those that equal their body, its corners.
     exact : ndarray of bool, shape (n_shapes,)
         Whether a shape equals its capsule, box or half-space.
     bodies : ndarray of int, shape (n_bodies, 5)
@@ -149,10 +149,12 @@ class ContactShapes(NamedTuple):
             last = min(links[mover], arm.n_actuated)
             proxies.append(((carrier, mover), (finer[carrier], finer[mover])))
             planes.append((carrier, mover, base, last, frame))
+            fine = bodies[finer[mover]]
+            # Bodies about a shape take turns, so that all of its points count.
+            aside = fine.rounding if fine.excess > 0 else 0.0
             for axis in range(base, links[mover]):
-                # The fine polytope has all corners of the coarse one.
-                corners = bodies[finer[mover]].corners
-                travel[axis, column] = point_speed(arm.chain, axis, links[mover], corners)
+                speed = point_speed(arm.chain, axis, links[mover], fine.corners)
+                travel[axis, column] = speed + (0.0 if arm.chain.prismatic[axis] else aside)
         extents = np.array(
             [(body.corners.min(axis=0), body.corners.max(axis=0)) for body in bodies]
         ).reshape(-1, 2, 3)

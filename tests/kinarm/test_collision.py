@@ -7,9 +7,11 @@ from configurations import contact_boundary, depths, jittered, random_configurat
 from simulators import changed
 
 from kinarm.arm import Arm
+from kinarm.bodies import HeldBody
 from kinarm.collision import ContactModel
 from kinarm.contact_pairs import make_verdicts_reliable, start_anew
 from kinarm.contact_shapes import WITH_HALFSPACE
+from kinarm.contact_statistics import contact_on_bare_ground
 from kinarm.episodes import COLLISION, PAUSED, Control
 from kinarm.kernels.rollout import advance
 from kinarm.scene import Scene
@@ -126,6 +128,21 @@ class TestTravel:
             assert (motion <= bound + 1e-12).all()
             tightest = max(tightest, (motion / np.fmax(bound, 1e-9)).max())
         assert tightest > 0.9
+
+    def test_bounds_the_motion_of_a_mesh_whose_polytope_leaves_vertices_out(self):
+        rng = np.random.default_rng(4)
+        vertices = rng.normal(size=(1000, 3))
+        vertices *= 0.2 / np.linalg.norm(vertices, axis=1)[:, None]
+        ball = HeldBody(name="it", link="hand", shape="mesh", vertices=vertices)
+        arm = Arm.load("paper", held_bodies=(ball,))
+        shapes = contact_on_bare_ground(arm).shapes
+        shape = arm.geometry.geometryObjects[-1]
+        placed = vertices @ shape.placement.rotation.T + shape.placement.translation
+        last = shape.parentJoint - 1
+        farthest = np.linalg.norm(np.cross(arm.chain.axis[last], placed), axis=1).max()
+        ground = arm.geometry.ngeoms
+        column = shapes.pairs.tolist().index([WITH_HALFSPACE, ground - 1, ground])
+        assert farthest <= shapes.travel[last, column] <= farthest + 0.01
 
     def test_turning_the_base_leaves_heights_alone(self, simulator):
         shapes = simulator.world.contact_model.shapes
