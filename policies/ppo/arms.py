@@ -1,4 +1,4 @@
-"""The arms of a training, their episodes, and rollouts of the actor."""
+"""The arms of a training, and their episodes."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -8,8 +8,6 @@ from kinarm.policies.mirror import problem_mirror
 from kinarm.policies.normalizer import input_scale
 from kinarm.policies.ppo import EpisodeStates, PPOConfig, PPOState
 from kinarm.policies.ppo.kernels.layers import Numbers
-from kinarm.policies.ppo.kernels.update import Experience, choose
-from kinarm.policies.ppo.networks import ActorCritic
 from kinarm.randomness import Stream, stream_generator
 
 Reals = NDArray[np.floating]
@@ -161,55 +159,6 @@ class TrainingArms:
         episodes.q[rows] = self._start[rows]
         self.simulator.begin(episodes, rows)
         self._total[rows] = 0.0
-
-
-def collect(
-    networks: ActorCritic,
-    arms: TrainingArms,
-    rng: np.random.Generator,
-    *,
-    threads: int,
-) -> Experience:
-    """Step the arms, then judge all steps at once.
-
-    An episode that the time limit cut short would go on: its last reward gets
-    the value of its last observation.
-
-    Parameters
-    ----------
-    networks : ActorCritic
-        Choose and judge actions.
-    arms : TrainingArms
-        What is stepped.
-    rng : numpy.random.Generator
-        Draws the noise of actions.
-    threads : int
-        Threads that find values.
-    """
-    config, log_std = arms.config, networks.log_std
-    least = -np.inf if config.replay_log_std is None else config.replay_log_std
-    shape = (config.n_steps, config.n_envs)
-    observations = np.empty((*shape, arms.simulator.n_observations), dtype=np.float32)
-    actions = np.empty((*shape, len(log_std)), dtype=np.float32)
-    scales, densities, rewards, going_on = (np.ones(shape, dtype=np.float32) for _ in range(4))
-    for step in range(config.n_steps):
-        observations[step] = seen = arms.observe()
-        rates, extent = arms.rates(arms.episodes.observation)
-        noise = rng.standard_normal(actions[step].shape).astype(np.float32)
-        outcome = actions[step], scales[step], densities[step]
-        choose(networks.means(seen), log_std, noise, arms.replayed, least, *outcome)
-        rewards[step], ended = arms.step(np.clip(rates + extent * actions[step], -1.0, 1.0))
-        going_on[step] = ~ended
-    steps = np.repeat(np.arange(config.n_steps), [len(rows) for rows in arms.cut_short])
-    flat = observations.reshape(-1, observations.shape[-1])
-    values = networks.values(np.concatenate([flat, arms.observe(), *arms.finals]), threads)
-    end = len(flat) + config.n_envs
-    rewards[steps, np.concatenate(arms.cut_short)] += np.float32(config.gamma) * values[end:]
-    values = values[:end].reshape(-1, config.n_envs)
-    advantages = estimate_advantages(rewards, values, going_on, config.gamma, config.gae_lambda)
-    parts = (observations, actions, scales, densities, advantages, advantages + values[:-1])
-    # Arm after arm, as in Stable-Baselines3.
-    return Experience(*(part.swapaxes(0, 1).reshape(-1, *part.shape[2:]) for part in parts))
 
 
 def estimate_advantages(

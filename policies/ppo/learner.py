@@ -15,13 +15,14 @@ from kinarm.policies.learners import CurvePoint
 from kinarm.policies.library import layer_widths, starting_policy, statistics
 from kinarm.policies.normalizer import Normalizer
 from kinarm.policies.ppo import EpisodeStates, PPOConfig, PPOState
-from kinarm.policies.ppo.arms import TrainingArms, collect
+from kinarm.policies.ppo.arms import TrainingArms, estimate_advantages
 from kinarm.policies.ppo.kernels.layers import Numbers
 from kinarm.policies.ppo.kernels.update import (
     Descent,
     Experience,
     Objective,
     add_gradients,
+    choose,
     descend,
     standardisation,
 )
@@ -113,10 +114,7 @@ class PPOTraining:
         if log_std is not None:
             networks.log_std[:] = log_std
         arms.restore(state, rng)
-        experience = collect(networks, arms, rng, threads=self.threads)
-        moments = networks.scattered(state.first_moment), networks.scattered(state.second_moment)
-        update(config, state.iteration, networks, moments, experience, rng, self.threads)
-        vectors = [networks.gathered(each) for each in (networks.weights, *moments)]
+        vectors = self.update(state, self.collect(rng), rng)
         if not all(np.isfinite(vector).all() for vector in vectors):
             raise InvalidInputError(
                 f"iteration {state.iteration + 1} diverged: the parameters are no longer finite; "
@@ -141,48 +139,71 @@ class PPOTraining:
             curve=state.curve_with(point),
         )
 
+    def collect(self, rng: np.random.Generator) -> Experience:
+        """Step the arms, with noise from a generator, then judge all steps at once.
 
-def update(
-    config: PPOConfig,
-    iteration: int,
-    networks: ActorCritic,
-    moments: tuple[Numbers, Numbers],
-    experience: Experience,
-    rng: np.random.Generator,
-    threads: int,
-) -> None:
-    """Change networks and moments by the experience of a rollout.
+        An episode that the time limit cut short would go on: its last reward gets
+        the value of its last observation.
+        """
+        config, networks, arms, log_std = (
+            self.config,
+            self.networks,
+            self.arms,
+            self.networks.log_std,
+        )
+        least = -np.inf if config.replay_log_std is None else config.replay_log_std
+        shape = (config.n_steps, config.n_envs)
+        observations = np.empty((*shape, arms.simulator.n_observations), dtype=np.float32)
+        actions = np.empty((*shape, len(log_std)), dtype=np.float32)
+        scales, densities, rewards, going_on = (np.ones(shape, dtype=np.float32) for _ in range(4))
+        for step in range(config.n_steps):
+            observations[step] = seen = arms.observe()
+            rates, extent = arms.rates(arms.episodes.observation)
+            noise = rng.standard_normal(actions[step].shape).astype(np.float32)
+            outcome = actions[step], scales[step], densities[step]
+            choose(networks.means(seen), log_std, noise, arms.replayed, least, *outcome)
+            rewards[step], ended = arms.step(np.clip(rates + extent * actions[step], -1.0, 1.0))
+            going_on[step] = ~ended
+        steps = np.repeat(np.arange(config.n_steps), [len(rows) for rows in arms.cut_short])
+        flat = observations.reshape(-1, observations.shape[-1])
+        judged = np.concatenate([flat, arms.observe(), *arms.finals])
+        values = networks.values(judged, self.threads)
+        end = len(flat) + config.n_envs
+        rewards[steps, np.concatenate(arms.cut_short)] += np.float32(config.gamma) * values[end:]
+        values = values[:end].reshape(-1, config.n_envs)
+        advantages = estimate_advantages(rewards, values, going_on, config.gamma, config.gae_lambda)
+        parts = (observations, actions, scales, densities, advantages, advantages + values[:-1])
+        # Arm after arm, as in Stable-Baselines3.
+        return Experience(*(part.swapaxes(0, 1).reshape(-1, *part.shape[2:]) for part in parts))
 
-    Gradients of parts are added up in a fixed order, so that the result does
-    not depend on threads.
+    def update(
+        self, state: PPOState, experience: Experience, rng: np.random.Generator
+    ) -> list[Numbers]:
+        """Change the networks; return their parameters, and Adam's two moments.
 
-    Parameters
-    ----------
-    config, iteration : PPOConfig and int
-        Settings, and number of earlier updates.
-    networks : ActorCritic
-        What is trained.
-    moments : tuple of ndarray of float32
-        Adam's two moments, laid out like the weights; changed.
-    experience : Experience
-        What is learnt from.
-    rng : numpy.random.Generator
-        Draws minibatches.
-    threads : int
-        Threads that share the parts.
-    """
-    n_steps, size = config.steps_per_iteration, config.batch_size
-    objective = Objective(config.clip_range, config.ent_coef, config.vf_coef, 1.0 / size)
-    done = iteration / config.iterations
-    learning_rate = scheduled(config.learning_rate, config.learning_rate_schedule, done)
-    descent = Descent(learning_rate, config.max_grad_norm)
-    steps_before = iteration * config.n_epochs * (n_steps // size)
-    gradients = np.empty((PARTS, len(networks.weights)), dtype=np.float32)
-    nets = (networks.actor, networks.critic)
-    passes = (rng.permutation(n_steps).reshape(-1, size) for _ in range(config.n_epochs))
-    minibatches = itertools.chain.from_iterable(passes)
-    for step, chosen in enumerate(minibatches, start=steps_before + 1):
-        standard = standardisation(chosen, experience.advantages)
-        given = (*nets, experience, chosen, objective, standard, gradients)
-        run_rows(add_gradients, PARTS, BALANCED_STEPS, threads, *given)
-        descend(*nets, *moments, gradients, descent, step)
+        Gradients of parts are added up in a fixed order, so that the result does
+        not depend on threads.
+
+        Parameters
+        ----------
+        state, experience, rng
+            What was before, what is learnt from, and what draws minibatches.
+        """
+        config, networks = self.config, self.networks
+        moments = networks.scattered(state.first_moment), networks.scattered(state.second_moment)
+        n_steps, size = config.steps_per_iteration, config.batch_size
+        objective = Objective(config.clip_range, config.ent_coef, config.vf_coef, 1.0 / size)
+        done = state.iteration / config.iterations
+        learning_rate = scheduled(config.learning_rate, config.learning_rate_schedule, done)
+        descent = Descent(learning_rate, config.max_grad_norm)
+        steps_before = state.iteration * config.n_epochs * (n_steps // size)
+        gradients = np.empty((PARTS, len(networks.weights)), dtype=np.float32)
+        nets = (networks.actor, networks.critic)
+        passes = (rng.permutation(n_steps).reshape(-1, size) for _ in range(config.n_epochs))
+        minibatches = itertools.chain.from_iterable(passes)
+        for step, chosen in enumerate(minibatches, start=steps_before + 1):
+            standard = standardisation(chosen, experience.advantages)
+            given = (*nets, experience, chosen, objective, standard, gradients)
+            run_rows(add_gradients, PARTS, BALANCED_STEPS, self.threads, *given)
+            descend(*nets, *moments, gradients, descent, step)
+        return [networks.gathered(each) for each in (networks.weights, *moments)]

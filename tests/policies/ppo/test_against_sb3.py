@@ -14,8 +14,8 @@ from stable_baselines3.common.buffers import RolloutBuffer
 from stable_baselines3.common.logger import Logger
 
 from kinarm.policies import PPOConfig, recipe, sb3_vec_env
-from kinarm.policies.ppo.arms import collect, estimate_advantages
-from kinarm.policies.ppo.learner import PPOTraining, update
+from kinarm.policies.ppo.arms import estimate_advantages
+from kinarm.policies.ppo.learner import PPOTraining
 from kinarm.policies.ppo.networks import initial_parameters, orthogonal, split_parameters
 from kinarm.problem import PROBLEMS
 from kinarm.task import RewardWeights
@@ -101,9 +101,7 @@ def begun(config):
         state = training.iterate(state)
     training.networks.load(state.parameters)
     training.arms.restore(state, np.random.default_rng(8))
-    rng = np.random.default_rng(7)
-    experience = collect(training.networks, training.arms, rng, threads=1)
-    return training, state, experience
+    return training, state, training.collect(np.random.default_rng(7))
 
 
 def test_rollout(config, begun):
@@ -155,22 +153,19 @@ def test_update(config, begun, monkeypatch):
     monkeypatch.setattr("numpy.random.permutation", np.random.default_rng(3).permutation)
     model.train()
     monkeypatch.undo()
-    networks, rng = training.networks, np.random.default_rng(3)
-    networks.load(state.parameters)
-    moments = [networks.scattered(m) for m in (state.first_moment, state.second_moment)]
-    constant = replace(config, learning_rate_schedule="constant")
-    given = (constant, state.iteration, networks, moments, experience, rng)
-    update(*given, threads=1)
+    training.networks.load(state.parameters)
+    training.config = replace(config, learning_rate_schedule="constant")
+    found = training.update(state, experience, np.random.default_rng(3))
     parameters = list(model.policy.parameters())
     optimizer = [model.policy.optimizer.state[parameter] for parameter in parameters]
     theirs = (
         [parameter.detach() for parameter in parameters],
         *([each[name] for each in optimizer] for name in ("exp_avg", "exp_avg_sq")),
     )
-    for ours, parts in zip((networks.weights, *moments), theirs, strict=True):
+    for ours, parts in zip(found, theirs, strict=True):
         expected = torch.cat([part.flatten() for part in parts]).numpy()
-        np.testing.assert_allclose(networks.gathered(ours), expected, rtol=0, atol=1e-5)
-    assert np.abs(networks.gathered(networks.weights) - state.parameters).max() > 1e-3
+        np.testing.assert_allclose(ours, expected, rtol=0, atol=1e-5)
+    assert np.abs(found[0] - state.parameters).max() > 1e-3
 
 
 class TestParameters:

@@ -14,7 +14,6 @@ from kinarm.policies import (
     train_policy,
 )
 from kinarm.policies.normalizer import input_scale
-from kinarm.policies.ppo.arms import collect as collect_rollout
 from kinarm.policies.ppo.learner import PPOTraining
 from kinarm.policies.ppo.networks import split_parameters
 from kinarm.problem import PROBLEMS, ReachProblem
@@ -107,8 +106,7 @@ class TestAdvantages:
             parts.critic[-1][1][:] = self.VALUE
             training.networks.load(state.parameters)
             training.arms.restore(state, np.random.default_rng(1))
-            given = (training.networks, training.arms, np.random.default_rng(2))
-            found = collect_rollout(*given, threads=1)
+            found = training.collect(np.random.default_rng(2))
             return found.advantages.reshape(2, 3), found.returns.reshape(2, 3)
 
         return collect
@@ -284,8 +282,7 @@ def test_replays_are_explored_with_more_noise():
         state = training.iterate(state)
     training.networks.load(state.parameters)
     training.arms.restore(state, np.random.default_rng(1))
-    given = (training.networks, training.arms, np.random.default_rng(2))
-    found = collect_rollout(*given, threads=1)
+    found = training.collect(np.random.default_rng(2))
     deviations = found.actions - training.networks.means(found.observations)
     wide = np.abs(deviations).max(axis=1) > 0.12  # 6.5 narrow deviations
     assert 0.2 < wide.mean() < 0.8

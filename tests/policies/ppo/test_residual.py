@@ -12,7 +12,6 @@ from kinarm.policies import PPOConfig, recipe
 from kinarm.policies.learners import state_policy, training_states
 from kinarm.policies.mirror import problem_mirror
 from kinarm.policies.policy import Layer
-from kinarm.policies.ppo.arms import collect
 from kinarm.policies.ppo.learner import PPOTraining
 
 BOTH = ReachProblem.load("both")
@@ -115,11 +114,11 @@ def test_learners_show_the_rates_and_add_to_them(problem):
     training = PPOTraining(config)
     state = training.initial_state()
     policy = state_policy(config, state)
-    arms, networks = training.arms, training.networks
-    networks.load(state.parameters)
+    arms = training.arms
+    training.networks.load(state.parameters)
     arms.restore(state, np.random.default_rng(0))
     q, goals = arms.episodes.q.copy(), arms.episodes.goal.copy()
-    collect(networks, arms, np.random.default_rng(0), threads=1)
+    training.collect(np.random.default_rng(0))
     expected = arms.simulator.rollout(policy, q, goals, record=True).paths[:, 5]
     going = arms.episodes.steps == 5
     assert going.sum() > 4
