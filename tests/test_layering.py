@@ -86,7 +86,7 @@ def test_no_module_needs_itself():
 def test_every_source_folder_was_searched():
     assert {path.relative_to(ROOT).parts[0] for path in SOURCES} == set(PACKAGES)
     assert "kinarm.arm" in imported_modules(ROOT / "kinarm" / "simulator.py")
-    assert "kinarm.simulator" in imported_modules(ROOT / "policies" / "ars" / "algorithm.py")
+    assert "kinarm.simulator" in imported_modules(ROOT / "policies" / "oracle" / "oracle.py")
 
 
 @pytest.mark.parametrize("package", PACKAGES.values())

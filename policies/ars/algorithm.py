@@ -12,7 +12,7 @@ from kinarm.episodes import Rollouts
 from kinarm.errors import InvalidInputError
 from kinarm.failed_scenarios import FailedScenarios, StartsAndGoals
 from kinarm.kernels.compiling import Array
-from kinarm.networks import Layer, Mirror, Networks, split_parameters
+from kinarm.networks import Layer, Networks, split_parameters
 from kinarm.policies.ars import ARSConfig, ARSState
 from kinarm.policies.ars.networks import (
     first_deviations,
@@ -28,7 +28,6 @@ from kinarm.policies.normalizer import Normalizer, input_scale
 from kinarm.policies.policy import Policy
 from kinarm.policies.provenance import Provenance
 from kinarm.randomness import Stream, stream_generator
-from kinarm.simulator import Simulator
 
 
 class ARSTraining:
@@ -81,7 +80,7 @@ class ARSTraining:
         theta, normalizer = state.theta, state.normalizer
         rng.bit_generator.state = state.generator
         delta = perturbations(rng, (N, *theta.shape))
-        scenarios = draw_shared(config, simulator, rng, state.failed, self.mirror)
+        scenarios = self.draw_shared(rng, state.failed)
         seen = policy_normalizer(config, normalizer)
         if config.net_arch:
             policies = perturbed_networks(theta, config.noise * delta, seen, self._widths)
@@ -111,6 +110,19 @@ class ARSTraining:
             failed=failed,
             curve=state.curve_with(point),
         )
+
+    def draw_shared(self, rng: np.random.Generator, failed: FailedScenarios) -> "Scenarios":
+        """Draw the scenarios of an iteration, shared, reflected and replayed as configured."""
+        config, mirror = self.config, self.mirror
+        copies = {"none": 1, "pair": 2, "iteration": 2 * config.directions}[config.sharing]
+
+        def draw(count: int) -> StartsAndGoals:
+            drawn = self.simulator.sample(rng, count)
+            return drawn if mirror is None else mirror.scenarios_from_the_right(*drawn)
+
+        count = 2 * config.directions * config.episodes // copies
+        (starts, goals), replayed = failed.mixed(config.replay_share, rng, count, draw)
+        return Scenarios(starts, goals, replayed, copies)
 
 
 class Scenarios(NamedTuple):
@@ -142,35 +154,6 @@ class Scenarios(NamedTuple):
         reached = np.count_nonzero(rollouts.success.reshape(self.copies, -1), axis=0)
         missed = 2 * reached <= self.copies
         return self.starts[missed], self.goals[missed]
-
-
-def draw_shared(
-    config: ARSConfig,
-    simulator: Simulator,
-    rng: np.random.Generator,
-    failed: FailedScenarios,
-    mirror: Mirror | None = None,
-) -> Scenarios:
-    """Draw the scenarios of an iteration, shared and replayed as configured.
-
-    Parameters
-    ----------
-    config, simulator, rng
-        Settings, what draws starts and goals, and random numbers for it.
-    failed : FailedScenarios
-        What may be replayed.
-    mirror : Mirror, optional
-        Reflects new scenarios with goals on the left.
-    """
-    copies = {"none": 1, "pair": 2, "iteration": 2 * config.directions}[config.sharing]
-
-    def draw(count: int) -> StartsAndGoals:
-        drawn = simulator.sample(rng, count)
-        return drawn if mirror is None else mirror.scenarios_from_the_right(*drawn)
-
-    count = 2 * config.directions * config.episodes // copies
-    (starts, goals), replayed = failed.mixed(config.replay_share, rng, count, draw)
-    return Scenarios(starts, goals, replayed, copies)
 
 
 def policy_normalizer(config: ARSConfig, seen: Normalizer) -> Normalizer:

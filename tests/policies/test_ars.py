@@ -14,7 +14,6 @@ from kinarm.policies.ars.algorithm import (
     ARSTraining,
     Scenarios,
     ars_step,
-    draw_shared,
     perturbed_policies,
     top_directions,
 )
@@ -126,7 +125,9 @@ class TestPolicies:
 
 def drawn(config, simulator, rng):
     """Scenarios of an iteration before any was failed."""
-    return draw_shared(config, simulator, rng, FailedScenarios.none(simulator.arm.n_joints))
+    training = ARSTraining(config, threads=1)
+    training.simulator = simulator
+    return training.draw_shared(rng, FailedScenarios.none(simulator.arm.n_joints))
 
 
 class TestIteration:
@@ -190,10 +191,8 @@ class TestScenarios:
         config = replace(TINY, problem="both", symmetric=True, episodes=20)
         simulator = config.simulator(threads=1)
         rngs = [np.random.default_rng(14) for _ in range(2)]
-        plain = drawn(config, simulator, rngs[0])
-        failed = FailedScenarios.none(simulator.arm.n_joints)
-        mirror = problem_mirror(config.problem)
-        folded = draw_shared(config, simulator, rngs[1], failed, mirror)
+        plain = drawn(replace(config, symmetric=False), simulator, rngs[0])
+        folded = drawn(config, simulator, rngs[1])
         left = plain.goals[:, 1] > 0
         assert 0.3 < left.mean() < 0.7
         np.testing.assert_array_equal(folded.goals[:, 1], -np.abs(plain.goals[:, 1]))
