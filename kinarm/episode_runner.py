@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from kinarm._parallel import one_torch_thread, run_together
+from kinarm.episode_draws import scenes_at
 from kinarm.episodes import PAUSED, RUNNING, TRUNCATED, Control, Episodes
 from kinarm.errors import StartInContactError, finite_array
 from kinarm.kernels.compiling import Array
@@ -102,7 +103,7 @@ class EpisodeRunner:
         if not run_together(begin, len(rows), self.threads, session.of_thread, rows):
             return
         paused = rows[episodes.status[rows] == PAUSED]
-        there = self.world.moved(episodes.scenes_at(paused), episodes.steps[paused])
+        there = self.world.moved(scenes_at(episodes.scenes, paused), episodes.steps[paused])
         touching = contacts.touching(episodes.q[paused], there)
         if touching.any():
             first = int(touching.argmax())
@@ -143,7 +144,7 @@ class EpisodeRunner:
     def _decide(self, session: Session, paused: NDArray[np.int64]) -> NDArray[np.int64]:
         """Let Coal refuse steps in doubt; return which episodes go on."""
         episodes = session.episodes
-        ways = episodes.q[paused], episodes.target[paused], episodes.scenes_at(paused)
+        ways = episodes.q[paused], episodes.target[paused], scenes_at(episodes.scenes, paused)
         steps = self.world.steps_of(*ways, episodes.steps[paused])
         refused, asked = steps_in_contact(steps, episodes.doubt[paused], self.world.rules)
         self.checked_by_coal += asked

@@ -229,10 +229,6 @@ class Episodes(NamedTuple):
         turn: Array = self.pursuit.turn
         return turn if self.goal.shape[1] > 3 else turn[:0]
 
-    def scenes_at(self, rows: NDArray[np.int64]) -> Array:
-        """Scenes of some episodes when they began; empty if all have the same."""
-        return self.scenes[rows] if len(self.scenes) else self.scenes
-
 
 @dataclass(frozen=True, eq=False)
 class Rollouts:

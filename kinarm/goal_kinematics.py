@@ -181,11 +181,15 @@ class GoalKinematics(InverseKinematics):
         return found, filled
 
     @cached_property
+    def no_scenes(self) -> Array:
+        """Those of `kinarm.World.scenes_of` if all have the same."""
+        return np.zeros((0, *self.contact_model.shapes.placed.shape))
+
+    @cached_property
     def reachable_of_sample(self) -> int:
         """Of how many of ``SAMPLE`` goals a configuration is found, with nothing random around."""
         goals = self.goals.draw(np.random.default_rng(0), SAMPLE)
-        nothing = np.zeros((0, *self.contact_model.shapes.placed.shape))
-        return int(self.solved_goals(goals, np.zeros(SAMPLE), nothing)[0].sum())
+        return int(self.solved_goals(goals, np.zeros(SAMPLE), self.no_scenes)[0].sum())
 
     def reached(self, configurations: ArrayLike) -> Array:
         """What the tool reaches at configurations, as goals are, shape (n, goal_width)."""

@@ -153,7 +153,7 @@ class World(GoalKinematics, StepContact):
         tools, free, touching, n_proven = self.proven(q, scenes)
         if n_proven < len(q):
             doubtful = ~(free | touching)
-            there = self._no_scenes if scenes is None or not len(scenes) else scenes[doubtful]
+            there = self.no_scenes if scenes is None or not len(scenes) else scenes[doubtful]
             touching[doubtful] = self.contact_model.touching(q[doubtful], there)
         return tools, touching
 
@@ -178,7 +178,7 @@ class World(GoalKinematics, StepContact):
         (n,) each, and how many are one or the other; Coal decides about the rest. Takes the scenes
         of `scenes_of`, one for each; without, random bodies are absent.
         """
-        n, scenes = len(q), self._no_scenes if scenes is None else scenes
+        n, scenes = len(q), self.no_scenes if scenes is None else scenes
         tools, free, touching = np.empty((n, 3)), np.empty(n, dtype=bool), np.empty(n, dtype=bool)
         chain, shapes, _ = self.records
         arrays = (chain, shapes, q, scenes, tools, free, touching)
@@ -206,10 +206,6 @@ class World(GoalKinematics, StepContact):
     def _draws(self) -> SceneDraws:
         return SceneDraws.of(self.problem.scene)
 
-    @cached_property
-    def _no_scenes(self) -> Array:
-        return np.zeros((0, *self.contact_model.shapes.placed.shape))
-
     def scenes_of(self, starts: Array, goals: Array) -> Array:
         """Rows of the bodies of each episode, shape (n, n_placed, 16); empty if all have the same.
 
@@ -217,7 +213,7 @@ class World(GoalKinematics, StepContact):
         m], and goals, shape (n, goal_width); ProblemError if a body finds no place.
         """
         if not self.has_random_bodies:
-            return self._no_scenes
+            return self.no_scenes
         drawn = self.problem.scene, self._draws, self.arm.chain
         scenes = drawn_rows(*drawn, starts, np.ascontiguousarray(goals[:, :3]), self.threads)
         shapes, moving = self.contact_model.shapes, list(self.problem.scene.moving)

@@ -9,6 +9,7 @@ from gymnasium.spaces import Box, Space
 from numpy.typing import DTypeLike, NDArray
 
 from kinarm.envs.rendering import RENDER_MODES, EnvPictures
+from kinarm.episode_draws import scenes_at
 from kinarm.episodes import Episodes
 from kinarm.errors import InvalidInputError, UnknownNameError, one_or_many
 from kinarm.observation_part import UNIT, Ranges
@@ -183,7 +184,7 @@ class ArmEnvironment:
         if np.count_nonzero(refused) == np.count_nonzero(contact):
             return
         rows = np.flatnonzero(refused & (contact == 0))
-        ways = episodes.q[rows], episodes.target[rows], episodes.scenes_at(rows)
+        ways = episodes.q[rows], episodes.target[rows], scenes_at(episodes.scenes, rows)
         for row, step in zip(rows, world.steps_of(*ways, episodes.steps[rows] - 1), strict=True):
             model, end = step.at(1.0)
             index = model.first_in_contact(end)

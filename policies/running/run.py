@@ -125,8 +125,7 @@ class Run:
         world = self.simulator.world
         starts = np.tile(world.arm.home, (len(np.atleast_1d(goals)), 1))
         aims = world.check_scenarios(starts, goals)[1]
-        nothing = np.zeros((0, *world.contact_model.shapes.placed.shape))
-        found, _ = world.solved_goals(aims, np.zeros(len(aims)), nothing)
+        found, _ = world.solved_goals(aims, np.zeros(len(aims)), world.no_scenes)
         if not found.all():
             goal = aims[int(found.argmin())].tolist()
             raise InvalidInputError(f"the goal {goal} is out of reach, or all around it touches")
