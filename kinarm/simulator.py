@@ -46,12 +46,6 @@ class StepResult(NamedTuple):
     contact: NDArray[np.int64]
     task: ReachTask
 
-    @classmethod
-    def empty(cls, n: int, task: ReachTask) -> "StepResult":
-        """Empty tables for a task."""
-        rows = 2 + len(task.goal.told) + len(task.reward.terms)
-        return cls(np.empty((rows, n)), np.empty((3, n), bool), np.empty(n, np.int64), task)
-
     @property
     def reward(self) -> Array:
         """Sums of the terms, shape (n,)."""
@@ -245,8 +239,9 @@ class Simulator(EpisodeRunner):
         actions : array_like, shape (n, n_actions)
             Fractions of the velocity limits, clipped to [-1, 1].
         """
-        session = self._step(episodes, actions)
-        result = StepResult.empty(len(episodes.status), self.task)
+        session, task, n = self._step(episodes, actions), self.task, len(episodes.status)
+        numbers = np.empty((2 + len(task.goal.told) + len(task.reward.terms), n))
+        result = StepResult(numbers, np.empty((3, n), bool), np.empty(n, np.int64), task)
         results_of_step(session, result.numbers, result.flags, result.contact)
         return result
 
