@@ -18,7 +18,6 @@ from kinarm.policies.ppo import EpisodeStates, PPOConfig, PPOState
 from kinarm.policies.ppo.arms import TrainingArms, estimate_advantages
 from kinarm.policies.ppo.kernels.layers import Numbers
 from kinarm.policies.ppo.kernels.update import (
-    Descent,
     Experience,
     Objective,
     add_gradients,
@@ -195,7 +194,6 @@ class PPOTraining:
         objective = Objective(config.clip_range, config.ent_coef, config.vf_coef, 1.0 / size)
         done = state.iteration / config.iterations
         learning_rate = scheduled(config.learning_rate, config.learning_rate_schedule, done)
-        descent = Descent(learning_rate, config.max_grad_norm)
         steps_before = state.iteration * config.n_epochs * (n_steps // size)
         gradients = np.empty((PARTS, len(networks.weights)), dtype=np.float32)
         nets = (networks.actor, networks.critic)
@@ -205,5 +203,5 @@ class PPOTraining:
             standard = standardisation(chosen, experience.advantages)
             given = (*nets, experience, chosen, objective, standard, gradients)
             run_rows(add_gradients, PARTS, BALANCED_STEPS, self.threads, *given)
-            descend(*nets, *moments, gradients, descent, step)
+            descend(*nets, *moments, gradients, learning_rate, config.max_grad_norm, step)
         return [networks.gathered(each) for each in (networks.weights, *moments)]

@@ -55,13 +55,6 @@ class Objective(NamedTuple):
     share: float
 
 
-class Descent(NamedTuple):
-    """The step size of Adam, and the norm to which gradients are clipped."""
-
-    learning_rate: float
-    max_norm: float
-
-
 @kernel
 def choose(
     means: Numbers,
@@ -201,7 +194,8 @@ def descend(
     first_moment: Numbers,
     second_moment: Numbers,
     gradients: Numbers,
-    descent: Descent,
+    learning_rate: float,
+    max_norm: float,
     steps: int,
 ) -> None:
     """Add up a gradient, clip it, take a step of Adam, and transpose matrices.
@@ -214,6 +208,8 @@ def descend(
         Running means of gradients and their squares; changed.
     gradients : ndarray of float32, shape (n_parts, n_weights)
         Parts of the gradient; the first is overwritten.
+    learning_rate, max_norm : float
+        The step size of Adam, and the norm to which gradients are clipped.
     steps : int
         Which step it is, counted from 1.
     """
@@ -231,11 +227,11 @@ def descend(
     for lane in range(LANES):
         total += squares[lane]
     # Clip it, and move against its mean over its root mean square.
-    shrink = np.float32(min(descent.max_norm / (math.sqrt(total) + 1e-6), 1.0))
+    shrink = np.float32(min(max_norm / (math.sqrt(total) + 1e-6), 1.0))
     kept, squares_kept = np.float32(FIRST_DECAY), np.float32(SECOND_DECAY)
     taken, squares_taken = np.float32(1.0 - FIRST_DECAY), np.float32(1.0 - SECOND_DECAY)
     unbias = 1.0 - whole_power(FIRST_DECAY, steps)
-    stride = np.float32(descent.learning_rate / unbias)
+    stride = np.float32(learning_rate / unbias)
     unbias = 1.0 - whole_power(SECOND_DECAY, steps)
     widen = np.float32(1.0 / math.sqrt(unbias))
     epsilon = np.float32(EPSILON)

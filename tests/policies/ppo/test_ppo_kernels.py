@@ -7,7 +7,6 @@ from kinarm.errors import InvalidInputError
 from kinarm.kernels.compiling import kernel
 from kinarm.policies.ppo.kernels.layers import BLOCK, Matrix, evaluate, hyperbolic_tangent, multiply
 from kinarm.policies.ppo.kernels.update import (
-    Descent,
     Experience,
     Objective,
     add_gradients,
@@ -20,7 +19,7 @@ from kinarm.policies.ppo.networks import ActorCritic, split_parameters
 N_OBSERVATIONS, N_ACTIONS = 19, 3
 ARCHES = [(7,), (12, 10), (16, 33, 64), (130,)]
 OBJECTIVE = Objective(clip_range=0.2, ent_coef=0.01, vf_coef=0.5, share=1 / 150)
-DESCENT = Descent(learning_rate=0.01, max_norm=0.5)
+DESCENT = 0.01, 0.5  # learning rate, and largest norm of a gradient
 
 
 @kernel
@@ -171,7 +170,7 @@ class TestNetworks:
         for step in range(3):
             gradients = reference.found_gradient(experience)
             nets = (networks.actor, networks.critic)
-            descend(*nets, *moments, gradients, DESCENT, step + 1)
+            descend(*nets, *moments, gradients, *DESCENT, step + 1)
         for array in (networks.weights, *moments):
             again = networks.scattered(networks.gathered(array))
             np.testing.assert_array_equal(again, array)
@@ -196,7 +195,7 @@ def test_steps_of_adam():
         second = 0.999 * second + 0.001 * slope**2
         unbiased = first / (1 - 0.9**step), second / (1 - 0.999**step)
         weights -= 0.01 * unbiased[0] / (np.sqrt(unbiased[1]) + 1e-5)
-        descend(networks.actor, networks.critic, *moments, gradients, DESCENT, step)
+        descend(networks.actor, networks.critic, *moments, gradients, *DESCENT, step)
         np.testing.assert_allclose(networks.weights, weights, rtol=0, atol=1e-6)
     turned = networks.actor.turned.copy()
     networks.load(networks.gathered(networks.weights))
