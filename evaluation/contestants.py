@@ -89,7 +89,7 @@ class Contestant:
         return self.rollout(trials, record=record)
 
     def shielded(self) -> "Contestant":
-        """The same behind a shield (``kinarm.shield``), under a name of its own.
+        """The same behind a shield (``kinarm.kernels.shield``), under a name of its own.
 
         The oracle stays as it is: its motions touch nothing.
         """

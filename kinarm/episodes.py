@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass, field
 from functools import partial
+from itertools import product
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
@@ -76,6 +77,29 @@ class Rules(NamedTuple):
     def parts(self) -> int:
         """Parts of a step, at whose ends it is looked at first."""
         return self.tested or INTERVALS
+
+
+SCALES = (1.0, 0.5, 0.2, -0.3)
+"""Shares of a step that a shield tries."""
+
+ALL_MASKS = 8
+"""With so many joints or fewer, a shield may hold any of them."""
+
+
+def shield_table(n_actuated: int) -> Array:
+    """Shares of a step, joint by joint, that may replace it, shape (n, n_actuated).
+
+    All moving joints have the same share; the others are held. Of many joints, at most two are
+    held, or at most two move. Without joints there is no shield.
+    """
+    if n_actuated == 0:
+        return np.zeros((0, 0))
+    masks = [
+        mask
+        for mask in product((1.0, 0.0), repeat=n_actuated)
+        if any(mask) and (n_actuated <= ALL_MASKS or not 2 < sum(mask) < n_actuated - 2)
+    ]
+    return np.array([np.multiply(scale, mask) for scale in SCALES for mask in masks][1:])
 
 
 class Control(NamedTuple):

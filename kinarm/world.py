@@ -14,7 +14,7 @@ from kinarm.chain import Chain
 from kinarm.collision import ContactModel
 from kinarm.contact_shapes import PLANE, ContactShapes, unit_boxes
 from kinarm.episode_draws import EpisodePlants, drawn_rows
-from kinarm.episodes import Control, Episodes, Rules
+from kinarm.episodes import Control, Episodes, Rules, shield_table
 from kinarm.errors import InvalidInputError, finite_array, one_or_many, whole_number
 from kinarm.goal_kinematics import GoalKinematics
 from kinarm.kernels.compiling import Array, Stage
@@ -29,7 +29,6 @@ from kinarm.observation import observer
 from kinarm.observation_layout import ObservationLayout
 from kinarm.problem import ProblemLike, ReachProblem
 from kinarm.scene_draws import SceneDraws
-from kinarm.shield import shield_table
 from kinarm.step_contact import StepContact
 from kinarm.task import NEVER
 

@@ -8,11 +8,11 @@ import numpy as np
 
 from kinarm.collision import ContactModel
 from kinarm.episode_draws import EpisodePlants
+from kinarm.episodes import shield_table
 from kinarm.errors import InvalidInputError
 from kinarm.kernels.compiling import Array
 from kinarm.kernels.plant import RATE, SERVO, TRAPEZE
 from kinarm.plant import Plant
-from kinarm.shield import shield_table
 from kinarm.viewer.drawing import DrawnScene, draw_stage
 from kinarm.viewer.html_page import HtmlPage, page_html
 from kinarm.viewer.pages import arm_data, contact_data

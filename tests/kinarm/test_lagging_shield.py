@@ -5,9 +5,9 @@ import pytest
 from random_scenes import among, swinging
 from reference_episodes import held_actions
 
+from kinarm.episodes import shield_table
 from kinarm.kernels.plant import COMMAND, MOST_CHANGE, RATE, STEADY
 from kinarm.plant import Plant
-from kinarm.shield import shield_table
 from kinarm.simulator import Simulator
 from tests.helpers.reference_plant import ReferencePlant
 

@@ -6,8 +6,8 @@ from known_arms import INSTALLED
 from random_scenes import CLUTTER, among
 from reference_episodes import held_actions
 
+from kinarm.episodes import shield_table
 from kinarm.problem import ReachProblem
-from kinarm.shield import shield_table
 from kinarm.simulator import Simulator
 from kinarm.world import World
 
