@@ -1,5 +1,6 @@
 """What goals mean for an arm: where they lie, and which configurations reach them."""
 
+from collections.abc import Callable
 from functools import cached_property
 from typing import Any
 
@@ -45,6 +46,7 @@ class GoalKinematics(InverseKinematics):
     problem: ReachProblem
     contact_model: ContactModel
     rules: Rules
+    free: Callable[[Array, Array], tuple[Array, NDArray[np.bool_]]]
 
     def checked(self, what: str, listed: tuple[tuple[float, ...], ...]) -> Array:
         """Listed configurations, shape (n, n_joints), if all are possible [rad or m]."""
@@ -214,10 +216,6 @@ class GoalKinematics(InverseKinematics):
         errors_between(task.goal.number, achieved, wanted, distances, turns)
         near = (distances <= task.tolerance) & (turns <= task.goal.rotation_tolerance)
         return near.reshape(shape)[()]
-
-    def free(self, q: Array, scenes: Array) -> tuple[Array, NDArray[np.bool_]]:
-        """Tool points of configurations, and which count as free; see `kinarm.World`."""
-        raise NotImplementedError
 
     def check_scenarios(self, starts: ArrayLike, goals: ArrayLike) -> tuple[Array, Array]:
         """Copy starts and goals, or refuse them."""

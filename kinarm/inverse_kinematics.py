@@ -1,6 +1,6 @@
 """Kinematics of an arm: poses of its tool, and configurations that bring it to targets."""
 
-from abc import ABC, abstractmethod
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -78,15 +78,12 @@ class InverseSolutions:
         return chosen
 
 
-class InverseKinematics(ABC):
+class InverseKinematics:
     """Compiled kinematics of an arm, forwards and back; a `World` also knows about contact."""
 
     arm: Arm
     threads: int
-
-    @abstractmethod
-    def in_contact(self, configurations: ArrayLike) -> NDArray[np.bool_]:
-        """Tell which configurations touch something."""
+    in_contact: Callable[[ArrayLike], NDArray[np.bool_]]
 
     @cached_property
     def tool(self) -> Array:
