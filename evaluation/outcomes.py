@@ -86,8 +86,7 @@ class Outcomes:
     Attributes
     ----------
     rollouts : tuple of Rollouts
-        One per training seed, or what has the same columns without
-        configurations.
+        One per training seed.
     bounds : OracleSolutions or None
         What any policy could do in the trials, or in the first ones, if known.
     holding : tuple of Holding
@@ -98,7 +97,7 @@ class Outcomes:
         Resampled trials; each once by default.
     """
 
-    rollouts: tuple[Any, ...]
+    rollouts: tuple[Rollouts, ...]
     bounds: Any = None
     holding: tuple[Holding, ...] = ()
     time_step: float = float("nan")

@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kinarm._files import Archive, load_archive, reading, save_archive
+from kinarm.episodes import Rollouts
 from kinarm.errors import InvalidInputError
 from kinarm.evaluation.experiments.curve import Clock, Curve, CurvePoint, CurveSoFar
 from kinarm.evaluation.experiments.plan import Run
@@ -32,33 +33,14 @@ ARCHIVE = ("study run", 1)
 POLICY, OUTCOMES = "policy.", "outcomes."
 """Beginnings of names of arrays."""
 
+KEPT = (
+    *("distance", "steps", "returns", "success", "collision"),
+    *("turn", "goals_reached", "interventions"),
+)
+"""Columns of `Rollouts` that are kept of the trials."""
 
-class TrialOutcomes(NamedTuple):
-    """The trained policy in every trial; arrays of shape (n_trials,).
-
-    Attributes
-    ----------
-    distance : ndarray
-        Final distances [m].
-    steps : ndarray of int
-        Steps taken.
-    returns : ndarray
-        Sums of rewards.
-    success, collision : ndarray of bool
-        How the trials ended.
-    turn, goals_reached, interventions : ndarray
-        Final errors of the goals' rests [rad, or rad or m], goals reached, and
-        steps that a shield replaced; or empty.
-    """
-
-    distance: NDArray[np.float64]
-    steps: NDArray[np.int64]
-    returns: NDArray[np.float64]
-    success: NDArray[np.bool_]
-    collision: NDArray[np.bool_]
-    turn: NDArray[np.float64] = np.zeros(0)
-    goals_reached: NDArray[np.int64] = np.zeros(0, dtype=np.int64)
-    interventions: NDArray[np.int64] = np.zeros(0, dtype=np.int64)
+LEFT_OUT = ("starts", "goals", "configurations", "targets", "moments", "paths")
+"""Those that are not, and are empty where a file is read."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -71,8 +53,8 @@ class TrainedRun:
         The policy in the course of the training.
     last : CurvePoint
         The trained policy.
-    outcomes : TrialOutcomes
-        The trained policy in every trial.
+    outcomes : Rollouts
+        The trained policy in every trial, without configurations and goals.
     returns : ndarray, shape (n_iterations,), optional
         Mean returns of each iteration; kept with trials for the curve.
     curve_distance : ndarray of float32, shape (n_points, n_curve_trials), optional
@@ -83,7 +65,7 @@ class TrainedRun:
 
     curve: tuple[CurvePoint, ...]
     last: CurvePoint
-    outcomes: TrialOutcomes
+    outcomes: Rollouts
     returns: NDArray[np.float64] | None = None
     curve_distance: NDArray[np.float32] | None = None
     clock: Clock = field(default_factory=Clock)
@@ -164,7 +146,7 @@ def _run_content(run: Run, state: TrainingState, curve: CurveSoFar) -> bytes:
     content = policy_content(policy)
     arrays = {
         "curve": np.array(curve.points, dtype=float).reshape(-1, len(CurvePoint._fields)),
-        **{OUTCOMES + name: getattr(rollouts, name) for name in TrialOutcomes._fields},
+        **{OUTCOMES + name: getattr(rollouts, name) for name in KEPT},
         **{POLICY + name: array for name, array in content.arrays.items()},
     }
     if trials.curve is not None:
@@ -210,10 +192,11 @@ def load_run(path: Path, run: Run, clock: Clock) -> TrainedRun:
         How long it took.
     """
     with _content_of(path, run, POLICY) as (header, arrays):
+        empty: dict[str, Any] = dict.fromkeys(LEFT_OUT, np.empty(0))
         return TrainedRun(
             curve=rebuilt(tuple[CurvePoint, ...], "curve", arrays),
             last=CurvePoint(**header["last"]),
-            outcomes=TrialOutcomes(**_parts(arrays, OUTCOMES)),
+            outcomes=Rollouts(**empty, **_parts(arrays, OUTCOMES)),
             returns=arrays.get("returns"),
             curve_distance=arrays.get("curve_distance"),
             clock=clock,

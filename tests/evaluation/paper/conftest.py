@@ -5,10 +5,11 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
+from kinarm.episodes import Rollouts
 from kinarm.evaluation.experiments.curve import Clock, CurvePoint
 from kinarm.evaluation.experiments.experiment import Experiment
 from kinarm.evaluation.experiments.plan import Run, plan
-from kinarm.evaluation.experiments.runs import TrainedRun, TrialOutcomes
+from kinarm.evaluation.experiments.runs import LEFT_OUT, TrainedRun
 from kinarm.evaluation.paper.results import PaperResults, PaperRun
 
 POINTS, CURVE_TRIALS = 4, 10
@@ -41,7 +42,14 @@ def made_up_run() -> Callable[..., TrainedRun]:
         return TrainedRun(
             curve=tuple(points),
             last=points[-1],
-            outcomes=TrialOutcomes(distance, np.full(n, 64), np.zeros(n), nowhere, nowhere),
+            outcomes=Rollouts(
+                distance=distance,
+                steps=np.full(n, 64),
+                returns=np.zeros(n),
+                success=nowhere,
+                collision=nowhere,
+                **dict.fromkeys(LEFT_OUT, np.empty(0)),
+            ),
             returns=np.linspace(0, 1, POINTS),
             curve_distance=curve.astype(np.float32),
             clock=Clock(seconds=1.0, points=(0.1, 0.4, 0.7, 1.0)),
