@@ -24,7 +24,7 @@ from kinarm.contact_statistics import (
     arm_warnings,
     contact_on_bare_ground,
 )
-from kinarm.evaluation.report.templating import template_environment
+from kinarm.evaluation.report.templating import template
 
 
 def joint_speeds(arm: Arm) -> str:
@@ -52,9 +52,7 @@ def arm_facts(arm: Arm) -> str:
     contact, file = contact_on_bare_ground(arm), ArmFile.of(arm.specification.source)
     shapes = (_shape(each.geometry) for each in arm.geometry.geometryObjects)
     inflated = SelfContact(contact).warning()
-    environment = template_environment()
-    environment.filters["span"] = _span
-    text = environment.get_template("arm.txt").render(
+    text = template("arm.txt").render(
         arm=arm,
         about=[] if file is None else [file.title, file.licence, file.origin, file.notes],
         shapes=zip(contact.body_names, shapes, strict=False),
@@ -62,6 +60,7 @@ def arm_facts(arm: Arm) -> str:
         untested=untested_pairs(contact),
         warnings=[*arm_warnings(contact), *([inflated] if inflated else [])],
         samples=SAMPLES,
+        span=_span,
     )
     return text.rstrip()
 

@@ -9,7 +9,7 @@ from kinarm.contact_pairs import random_configurations
 from kinarm.contact_statistics import SAMPLES, ContactStatistics
 from kinarm.evaluation.bounds import oracle_bounds
 from kinarm.evaluation.outcomes import Pair
-from kinarm.evaluation.report.templating import template_environment
+from kinarm.evaluation.report.templating import template
 from kinarm.evaluation.statistics import Estimate
 from kinarm.evaluation.trials import TrialSet
 from kinarm.policies.mirror import missing_mirror
@@ -53,8 +53,7 @@ class ProblemCheck:
     mirror: str
 
     def __str__(self) -> str:
-        template = template_environment().get_template("problem_check.txt")
-        return template.render(vars(self)).rstrip()
+        return template("problem_check.txt").render(vars(self)).rstrip()
 
 
 def check_problem(

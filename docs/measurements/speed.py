@@ -17,7 +17,7 @@ from docs.measurements import limits, peers
 from kinarm import PROBLEMS, Simulator
 from kinarm._files import write_text
 from kinarm.evaluation.bench import measure, timed
-from kinarm.evaluation.report.templating import markdown_table, template_environment
+from kinarm.evaluation.report.templating import markdown_table, template
 from kinarm.policies import load_policy
 
 POLICY, REPETITIONS = "ars-tuned-both", 3
@@ -59,7 +59,7 @@ def main() -> None:
     command = f"python -m docs.measurements.speed {folder}"
     document = {"command": command, **measure(POLICY, REPETITIONS, ppo=True)}
     write_text(folder / "speed.json", json.dumps(document, indent=1) + "\n")
-    ours = template_environment().get_template("speed.md").render(document)
+    ours = template("speed.md").render(document)
     title, made, table = ours.split("\n\n", 2)
     parts = [title, "", made, "", "## Peers\n", *peers.page(load_policy(POLICY), REPETITIONS)]
     meshes = markdown_table(("arm", "what", "median", "best"), robots())

@@ -8,7 +8,7 @@ from typing import Any, ClassVar
 from kinarm._command_line import run_request
 from kinarm._console import open_console
 from kinarm._fields import Checked
-from kinarm.evaluation.report.templating import template_environment
+from kinarm.evaluation.report.templating import template
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -51,8 +51,8 @@ def _report(request: BenchmarkRequest, command: str) -> None:
     if request.json:
         print(json.dumps(document))
         return
-    template = template_environment().get_template("speed.md")
-    _, _, table = template.render({"ppo_training": {}, **document}).partition("\n\n")
+    page = template("speed.md").render({"ppo_training": {}, **document})
+    _, _, table = page.partition("\n\n")
     open_console().print(Markdown(table))
 
 

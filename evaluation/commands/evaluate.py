@@ -5,7 +5,7 @@ from functools import partial
 
 from kinarm._command_line import run_request
 from kinarm._console import open_console
-from kinarm.evaluation.report.templating import template_environment
+from kinarm.evaluation.report.templating import template
 from kinarm.evaluation.request import EvaluationRequest
 
 
@@ -22,9 +22,8 @@ def _report(request: EvaluationRequest, command: str) -> None:
     columns = request.chosen(all_columns()) if request.columns else ()
     print_table(document, console, markdown=request.markdown, columns=columns)
     if not request.markdown:
-        notes = template_environment().get_template("footnote.txt")
-        told = notes.render(protocol=document.protocol, results=document.results)
-        console.print(told.rstrip(), style="dim")
+        shown = {"protocol": document.protocol, "results": document.results}
+        console.print(template("footnote.txt").render(shown).rstrip(), style="dim")
         if not request.policies and all(row.trained_on is None for row in document.results):
             console.print("no shipped policy was trained for this", style="dim")
     for path in request.files:

@@ -13,7 +13,7 @@ from kinarm._tables import csv_text
 from kinarm.evaluation.experiments import table
 from kinarm.evaluation.experiments.table import Group, shown
 from kinarm.evaluation.figures import Band, panels_figure, save_figure
-from kinarm.evaluation.report.templating import markdown_table, template_environment
+from kinarm.evaluation.report.templating import markdown_table, template
 from kinarm.policies.provenance import package_versions, source_commit
 
 if TYPE_CHECKING:
@@ -75,12 +75,11 @@ def results_document(study: "Study", command: str) -> dict[str, Any]:
 
 def _page(name: str, study: "Study", document: dict[str, Any], curves: str) -> str:
     """A page that fetches nothing, by its template; equal input gives equal text."""
-    environment = template_environment(autoescape=name.endswith(".html"))
     experiment, groups = study.experiment, study.best(len(study))
     best: dict[str, Group] = {}
     for group in groups:
         best.setdefault(group.config.problem.name, group)
-    return environment.get_template(name).render(
+    return template(name).render(
         document,
         study=study,
         experiment=experiment,

@@ -23,7 +23,7 @@ from kinarm.evaluation.paper.results import (
     Reading,
     final_distances,
 )
-from kinarm.evaluation.report.templating import template_environment
+from kinarm.evaluation.report.templating import template
 from kinarm.policies.provenance import package_versions
 from kinarm.problem import PROBLEMS
 
@@ -113,8 +113,7 @@ def claims_document(
 
 def reproduction_page(results: PaperResults, claims: Claims, document: Mapping[str, Any]) -> str:
     """``REPRODUCTION.md``."""
-    template = template_environment(keep_trailing_newline=True).get_template("reproduction.md")
-    return template.render(
+    return template("reproduction.md").render(
         results=results,
         document=document,
         smoke=SMOKE.format(len(results.runs)),

@@ -17,7 +17,7 @@ from kinarm.evaluation.report.groups import (
     record_worst,
     worst_trials,
 )
-from kinarm.evaluation.report.templating import template_environment
+from kinarm.evaluation.report.templating import template
 from kinarm.evaluation.table import (
     SPREAD_PRIORITY,
     difference_columns,
@@ -70,8 +70,7 @@ def report_page(document: EvaluationDocument, evaluations: Sequence[Evaluation])
         If the document is of others, or two of them cannot be told apart.
     """
     problems = group_results(document, evaluations)
-    template = template_environment(autoescape=True).get_template("page.html")
-    return template.render(
+    return template("page.html").render(
         protocol=document.protocol,
         problems=problems,
         differences=document.differences,

@@ -2,22 +2,22 @@
 
 import math
 from collections.abc import Iterable, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from jinja2 import Environment
+    from jinja2 import Template
 
 
-def template_environment(**settings: Any) -> "Environment":
-    """Jinja's ``Environment`` for all templates, with these settings."""
-    from jinja2 import Environment, PackageLoader, StrictUndefined
+def template(name: str) -> "Template":
+    """A template by its file's name; what is put into HTML is escaped."""
+    from jinja2 import Environment, PackageLoader, StrictUndefined, select_autoescape
 
     environment = Environment(
         loader=PackageLoader(__package__),
         trim_blocks=True,
         lstrip_blocks=True,
         undefined=StrictUndefined,
-        **settings,
+        autoescape=select_autoescape(),
     )
     environment.filters.update(
         log10=math.log10,
@@ -25,7 +25,7 @@ def template_environment(**settings: Any) -> "Environment":
         percent=lambda share: f"{100 * share:.1f} %",
         dashes=lambda text: text.replace("..", "\N{EN DASH}"),
     )
-    return environment
+    return environment.get_template(name)
 
 
 def markdown_table(header: Sequence[str], rows: Iterable[Sequence[str]]) -> str:

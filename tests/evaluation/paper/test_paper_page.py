@@ -6,7 +6,7 @@ import pytest
 from kinarm.evaluation.paper.claims import assess
 from kinarm.evaluation.paper.page import claims_document, reproduction_page, run_rows
 from kinarm.evaluation.paper.results import LITERAL, Reading
-from kinarm.evaluation.report.templating import template_environment
+from kinarm.evaluation.report.templating import template
 
 
 def test_a_line_for_each_training(results_of, made_up_run):
@@ -49,5 +49,5 @@ def test_readings_without_ppo_leave_its_claims_out(results_of, made_up_run):
     ],
 )
 def test_median_over_seeds_says_how_many_got_there(steps, cell):
-    template = template_environment().get_template("cells.md")
-    assert template.make_module({"median": np.median}).median_steps(np.array(steps)) == cell
+    cells = template("cells.md").make_module({"median": np.median})
+    assert cells.median_steps(np.array(steps)) == cell

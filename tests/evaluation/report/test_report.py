@@ -12,7 +12,7 @@ from kinarm.errors import InvalidInputError
 from kinarm.evaluation import EvaluationRequest
 from kinarm.evaluation.report.groups import record_worst, worst_trials
 from kinarm.evaluation.report.page import report_page
-from kinarm.evaluation.report.templating import template_environment
+from kinarm.evaluation.report.templating import template
 from kinarm.evaluation.summary import evaluation_document
 
 
@@ -72,7 +72,7 @@ class TestWorst:
         bounds = SimpleNamespace(
             reachable=[True, True, False], steps=[9, 9, 64], steps_lower_bound=[9, 7, 40]
         )
-        parts = template_environment(autoescape=True).get_template("parts.html").module
+        parts = template("parts.html").module
         told = [parts.oracle_steps(bounds, trial) for trial in range(4)]
         assert told == ["9", "9, proven \N{GREATER-THAN OR EQUAL TO} 7", "not reached", "not asked"]
 

@@ -11,7 +11,7 @@ from drawings import PIXEL
 from kinarm.bodies import Body
 from kinarm.evaluation.report import charts
 from kinarm.evaluation.report.charts import level
-from kinarm.evaluation.report.templating import template_environment
+from kinarm.evaluation.report.templating import template
 from kinarm.evaluation.statistics import share_over_seeds
 from kinarm.scene import PAPER_BENCHES, Obstacle, Scene
 
@@ -44,7 +44,7 @@ def coordinates(path: str) -> np.ndarray:
     return np.array(re.findall(r"(-?[\d.]+)[ ,](-?[\d.]+)", path), dtype=float)
 
 
-CHART = template_environment(autoescape=True).get_template("chart.html").module
+CHART = template("chart.html").module
 
 
 def places(limits):
@@ -98,7 +98,7 @@ class TestMap:
         group, markers = right.contenders[0], markers_of(drawn_map(page))
         view, goals = charts.View.of(right.goal_regions), right.trials.goals
         outcomes, seen = charts.worst_outcomes(group), set()
-        symbols = template_environment().get_template("parts.html").module.symbols
+        symbols = template("parts.html").module.symbols
         assert sorted(markers) == list(range(len(goals)))
         for trial, marker in markers.items():
             across, down = coordinates(marker.get("d"))[0]
