@@ -3,6 +3,7 @@ from .commands.replay import ReplayRequest as ReplayRequest
 from .contestants import Contestant as Contestant
 from .document import EvaluationDocument as EvaluationDocument
 from .evaluation import Evaluation as Evaluation
+from .evaluation import PooledEvaluation as PooledEvaluation
 from .evaluation import evaluate as evaluate
 from .experiments.experiment import Experiment as Experiment
 from .experiments.study import Study as Study
@@ -16,7 +17,6 @@ from .report.page import report_page as report_page
 from .report.page import write_report as write_report
 from .request import EvaluationRequest as EvaluationRequest
 from .statistics import Estimate as Estimate
-from .summary import PooledEvaluation as PooledEvaluation
 from .summary import evaluation_document as evaluation_document
 from .summary import pool as pool
 from .trials import TrialSet as TrialSet

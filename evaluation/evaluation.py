@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import msgspec
 import numpy as np
@@ -14,7 +14,15 @@ from kinarm.episodes import Rollouts
 from kinarm.errors import InvalidInputError
 from kinarm.evaluation.bounds import MOST_BOUNDED, oracle_bounds
 from kinarm.evaluation.contestants import Contestant, Predictor, measure_holding
-from kinarm.evaluation.document import Failures, Result, TrialEnds, TrialHolding
+from kinarm.evaluation.document import (
+    Failures,
+    PooledResult,
+    Result,
+    Spread,
+    TrialEnds,
+    TrialHolding,
+    WorstSeed,
+)
 from kinarm.evaluation.estimates import estimate_metrics
 from kinarm.evaluation.finding import contestant_of
 from kinarm.evaluation.outcomes import Holding, Outcomes, failure_causes
@@ -25,9 +33,6 @@ from kinarm.networks import PolicyFunction
 from kinarm.policies.oracle import OracleSolutions
 from kinarm.policies.policy import Policy
 from kinarm.problem import ProblemLike, ReachProblem
-
-if TYPE_CHECKING:
-    from kinarm.evaluation.summary import Faced
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,9 +65,9 @@ class Evaluation:
         return self.trials.problem
 
     @cached_property
-    def metrics(self) -> dict[str, Estimate]:
+    def metrics(self: "Faced") -> dict[str, Estimate]:
         """Figures of merit by their name in `kinarm.evaluation.METRICS`."""
-        return estimate_metrics(outcomes_of((self,)))
+        return estimate_metrics(outcomes_of(self.members))
 
     @property
     def success(self) -> Estimate:
@@ -134,6 +139,64 @@ class Evaluation:
     def __repr__(self) -> str:
         on = f"{self.name} on {len(self.trials)} trials of {self.problem.name}"
         return f"Evaluation({on}, success {self.success})"
+
+
+@dataclass(frozen=True, eq=False)
+class PooledEvaluation:
+    """How several training seeds of one recipe did on the same trials; intervals are over both."""
+
+    name: str
+    members: tuple[Evaluation, ...]
+
+    @property
+    def problem(self) -> ReachProblem:
+        """The problem that was faced."""
+        return self.members[0].problem
+
+    metrics, difference = Evaluation.metrics, Evaluation.difference
+
+    @property
+    def worst(self) -> Evaluation:
+        """The training seed with the lowest success."""
+        return min(self.members, key=lambda member: int(member.rollouts.success.sum()))
+
+    @property
+    def spread(self) -> dict[str, Spread]:
+        """How the metrics that all seeds have vary over the seeds."""
+        spread = {}
+        for name in self.metrics:
+            known = [member.metrics[name].value for member in self.members]
+            each = [value for value in known if value is not None]
+            if len(each) == len(known):
+                std = float(np.std(each, ddof=1))
+                spread[name] = Spread(min=min(each), max=max(each), std=std, each=each)
+        return spread
+
+    @property
+    def result(self) -> PooledResult:
+        """Figures of merit over all seeds, for a document."""
+        worst = self.worst
+        return PooledResult(
+            **common_figures(self.name, self.members),
+            metrics=self.metrics,
+            members=[member.contestant.name for member in self.members],
+            training_seeds=[member.contestant.seed for member in self.members],
+            spread=self.spread,
+            worst_seed=WorstSeed(
+                policy=worst.contestant.name,
+                training_seed=worst.contestant.seed,
+                success=worst.success,
+            ),
+        )
+
+    def __repr__(self) -> str:
+        seeds, trials = len(self.members), self.members[0].trials
+        on = f"{self.name} on {len(trials)} trials of {self.problem.name}"
+        return f"PooledEvaluation({seeds} seeds of {on}, success {self.metrics['success']})"
+
+
+Faced = Evaluation | PooledEvaluation
+"""What a row of the table is about."""
 
 
 def outcomes_of(members: Sequence[Evaluation]) -> Outcomes:

@@ -1,10 +1,6 @@
-"""Sum up evaluations: pooled training seeds, differences, and the document of all."""
+"""Sum up evaluations: training seeds to pool, differences, and the document of all."""
 
 from collections.abc import Hashable, Iterator, Sequence
-from dataclasses import dataclass
-from functools import cached_property
-
-import numpy as np
 
 from kinarm.evaluation.contestants import ORACLE
 from kinarm.evaluation.document import (
@@ -12,81 +8,12 @@ from kinarm.evaluation.document import (
     EvaluationDocument,
     FacedProblem,
     Intervals,
-    PooledResult,
     Protocol,
-    Spread,
-    WorstSeed,
 )
-from kinarm.evaluation.estimates import estimate_metrics
-from kinarm.evaluation.evaluation import Evaluation, common_figures, outcomes_of
+from kinarm.evaluation.evaluation import Evaluation, Faced, PooledEvaluation
 from kinarm.evaluation.finding import is_called
 from kinarm.evaluation.selection import check_names, group_names, training_of
-from kinarm.evaluation.statistics import Estimate
 from kinarm.policies.provenance import package_versions, source_commit
-from kinarm.problem import ReachProblem
-
-
-@dataclass(frozen=True, eq=False)
-class PooledEvaluation:
-    """How several training seeds of one recipe did on the same trials."""
-
-    name: str
-    members: tuple[Evaluation, ...]
-
-    @property
-    def problem(self) -> ReachProblem:
-        """The problem that was faced."""
-        return self.members[0].problem
-
-    @cached_property
-    def metrics(self) -> dict[str, Estimate]:
-        """Figures of merit over all seeds; intervals are over seeds and trials."""
-        return estimate_metrics(outcomes_of(self.members))
-
-    difference = Evaluation.difference
-
-    @property
-    def worst(self) -> Evaluation:
-        """The training seed with the lowest success."""
-        return min(self.members, key=lambda member: int(member.rollouts.success.sum()))
-
-    @property
-    def spread(self) -> dict[str, Spread]:
-        """How the metrics that all seeds have vary over the seeds."""
-        spread = {}
-        for name in self.metrics:
-            known = [member.metrics[name].value for member in self.members]
-            each = [value for value in known if value is not None]
-            if len(each) == len(known):
-                std = float(np.std(each, ddof=1))
-                spread[name] = Spread(min=min(each), max=max(each), std=std, each=each)
-        return spread
-
-    @property
-    def result(self) -> PooledResult:
-        """Figures of merit over all seeds, for a document."""
-        worst = self.worst
-        return PooledResult(
-            **common_figures(self.name, self.members),
-            metrics=self.metrics,
-            members=[member.contestant.name for member in self.members],
-            training_seeds=[member.contestant.seed for member in self.members],
-            spread=self.spread,
-            worst_seed=WorstSeed(
-                policy=worst.contestant.name,
-                training_seed=worst.contestant.seed,
-                success=worst.success,
-            ),
-        )
-
-    def __repr__(self) -> str:
-        seeds, trials = len(self.members), self.members[0].trials
-        on = f"{self.name} on {len(trials)} trials of {self.problem.name}"
-        return f"PooledEvaluation({seeds} seeds of {on}, success {self.metrics['success']})"
-
-
-Faced = Evaluation | PooledEvaluation
-"""What a row of the table is about."""
 
 
 def pool(evaluations: Sequence[Evaluation]) -> tuple[PooledEvaluation, ...]:
