@@ -113,13 +113,7 @@ class TaskResult(NamedTuple):
 
 
 def train(task: Task, threads: int = 1) -> TaskResult:
-    """Train and evaluate; neither threads nor interruptions change the result.
-
-    Parameters
-    ----------
-    task, threads : Task and int
-        The training, and its number of threads.
-    """
+    """Train and evaluate; neither threads nor interruptions change the result."""
     run, begun, so_far, checkpoint = task
     config = run.config
     curve = Curve(config, run.trials, so_far)
