@@ -4,7 +4,7 @@ import os
 import pickle
 import socket
 import warnings
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import partial
@@ -15,7 +15,7 @@ from typing import Any
 from kinarm import SEMANTICS
 from kinarm._interrupts import kept_from_children
 from kinarm.errors import InvalidInputError, WorkerError, needed
-from kinarm.evaluation.experiments.executors import Failure, attempt
+from kinarm.evaluation.experiments.executors import Failure, Work, attempt
 from kinarm.policies.oracle import ORACLE_SEMANTICS
 from kinarm.policies.provenance import package_versions, source_commit
 
@@ -30,7 +30,7 @@ def identity() -> dict[str, str]:
     }
 
 
-def _do_alike(work: Callable[[Any], Any], expected: Mapping[str, str], task: Any) -> Any:
+def _do_alike(work: Work, expected: Mapping[str, str], task: Any) -> Any:
     """Do the work for a task if the driver's `identity` is the one here.
 
     Else a `WorkerError` names the first difference. A commit is compared where both know theirs.
@@ -75,9 +75,7 @@ class RayExecutor:
     jobs: int | None = None
     threads: int = 1
 
-    def map(
-        self, work: Callable[[Any], Any], tasks: Sequence[Any]
-    ) -> Iterator[tuple[Any, Any | Failure]]:
+    def map(self, work: Work, tasks: Sequence[Any]) -> Iterator[tuple[Any, Any | Failure]]:
         """Do the work for every task; see `Executor.map`."""
         if not tasks:
             return
@@ -153,9 +151,7 @@ class SlurmExecutor:
     threads: int = 1
     cluster: str = "slurm"
 
-    def map(
-        self, work: Callable[[Any], Any], tasks: Sequence[Any]
-    ) -> Iterator[tuple[Any, Any | Failure]]:
+    def map(self, work: Work, tasks: Sequence[Any]) -> Iterator[tuple[Any, Any | Failure]]:
         """Do the work for every task, bundle by bundle; see `Executor.map`."""
         submitit = needed("submitit", "submitit", "slurm")
         parts = [tasks[k : k + self.bundle] for k in range(0, len(tasks), self.bundle)]

@@ -17,6 +17,9 @@ from kinarm._interrupts import kept_from_children
 from kinarm.errors import WorkerError
 from kinarm.policies.learners import look_here
 
+Work = Callable[[Any], Any]
+"""From a task to its result."""
+
 
 class Failure(NamedTuple):
     """Why a task failed.
@@ -36,9 +39,7 @@ class Failure(NamedTuple):
 class Executor(Protocol):
     """Where tasks run."""
 
-    def map(
-        self, work: Callable[[Any], Any], tasks: Sequence[Any]
-    ) -> Iterator[tuple[Any, Any | Failure]]:
+    def map(self, work: Work, tasks: Sequence[Any]) -> Iterator[tuple[Any, Any | Failure]]:
         """Do the work for every task, begun in the given order; yield each task with its result.
 
         Work, tasks and results can be pickled. What the work raises becomes a
@@ -52,7 +53,7 @@ class Executor(Protocol):
         """
 
 
-def attempt(work: Callable[[Any], Any], task: bytes) -> Any:
+def attempt(work: Work, task: bytes) -> Any:
     """Do the work for a pickled task; errors are returned as a `Failure`.
 
     Its learner may be in a module of the current directory.
@@ -86,9 +87,7 @@ class LocalExecutor:
     jobs: int
     threads: int = 1
 
-    def map(
-        self, work: Callable[[Any], Any], tasks: Sequence[Any]
-    ) -> Iterator[tuple[Any, Any | Failure]]:
+    def map(self, work: Work, tasks: Sequence[Any]) -> Iterator[tuple[Any, Any | Failure]]:
         """Do the work for every task; see `Executor.map`."""
         if min(self.jobs, len(tasks)) <= 1:
             for task in tasks:

@@ -2,7 +2,7 @@
 
 import re
 import sys
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -13,6 +13,7 @@ from kinarm._interrupts import GOES_ON, telling
 from kinarm._parallel import available_threads
 from kinarm._tables import csv_text
 from kinarm.evaluation.experiments.curve import TrialSettings
+from kinarm.evaluation.experiments.executors import Work
 from kinarm.evaluation.experiments.experiment import Experiment
 from kinarm.evaluation.experiments.plan import Run, hash_of
 from kinarm.evaluation.experiments.runs import TaskResult
@@ -52,7 +53,7 @@ class Trained(NamedTuple):
 class ThisProcess:
     """An executor for one task, whose error ends it as it is."""
 
-    def map(self, work: Callable[[Any], Any], tasks: Sequence[Any]) -> Iterator[tuple[Any, Any]]:
+    def map(self, work: Work, tasks: Sequence[Any]) -> Iterator[tuple[Any, Any]]:
         """Do the work for every task; see `Executor.map`."""
         return ((task, work(task)) for task in tasks)
 
