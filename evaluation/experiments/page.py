@@ -37,7 +37,7 @@ def write_all(study: "Study", command: str = "") -> Path:
     """
     folder = study.store.folder
     write_csv(folder / "runs.csv", study.rows())
-    write_csv(folder / "curves.csv", table.curve_rows(study))
+    write_csv(folder / "curves.csv", study.curve_rows())
     curves = ""
     if figure := learning_curves(study):
         _, drawn = save_figure(figure, folder, CURVES)

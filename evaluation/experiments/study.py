@@ -333,3 +333,19 @@ class Study:
                 }
             )
         return rows
+
+    def curve_rows(self) -> list[dict[str, Any]]:
+        """One row per point of a learning curve, the ends included."""
+        fields = self.varied
+        return [
+            {
+                "entry": run.entry.name,
+                **identity(run),
+                **{field: run.choices.get(field) for field in fields},
+                **point._asdict(),
+                "seconds": seconds,
+                "processor_seconds": processor_seconds,
+            }
+            for run, trained in self.finished.items()
+            for point, seconds, processor_seconds in trained.timed_curve
+        ]

@@ -5,7 +5,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from operator import attrgetter
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,9 +20,6 @@ from kinarm.evaluation.statistics import Estimate, share_difference, share_over_
 from kinarm.evaluation.table import SEEDS_PRIORITY, difference_cell, metric_column
 from kinarm.policies.config import TrainingConfig
 from kinarm.policies.oracle import OracleSolutions
-
-if TYPE_CHECKING:
-    from kinarm.evaluation.experiments.study import Study
 
 FIGURES = (
     *("success", "relative_success", "collision", "median_distance", "median_steps", "step_ratio"),
@@ -199,23 +196,6 @@ COLUMNS: tuple[Column[Group], ...] = (
 def group_row(group: Group) -> tuple[str, ...]:
     """The row of a group."""
     return tuple(str(column.cell(group)) for column in COLUMNS)
-
-
-def curve_rows(study: "Study") -> list[dict[str, Any]]:
-    """One row per point of a learning curve, the ends included."""
-    fields = study.varied
-    return [
-        {
-            "entry": run.entry.name,
-            **identity(run),
-            **{field: run.choices.get(field) for field in fields},
-            **point._asdict(),
-            "seconds": seconds,
-            "processor_seconds": processor_seconds,
-        }
-        for run, trained in study.finished.items()
-        for point, seconds, processor_seconds in trained.timed_curve
-    ]
 
 
 def group_entries(group: Group) -> dict[str, Any]:

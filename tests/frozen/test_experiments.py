@@ -12,7 +12,6 @@ import numpy as np
 from kinarm.evaluation import Study
 from kinarm.evaluation.experiments.experiment import Experiment
 from kinarm.evaluation.experiments.page import results_document
-from kinarm.evaluation.experiments.table import curve_rows
 
 FROZEN = Path(__file__).parent
 
@@ -58,6 +57,6 @@ def test_learners_compared(tmp_path):
             "collisions": str(round(60 * row["collision"])),
             "median_distance": str(round(row["median_distance"], 5)),
         }
-        for row in curve_rows(study)
+        for row in study.curve_rows()
     ]
     assert found == [row for row in rows_of("learners.csv") if row["learner"] in learners]
