@@ -59,10 +59,10 @@ class Evaluation:
         """Itself, where several training seeds would be pooled."""
         return (self,)
 
-    @property
-    def problem(self) -> ReachProblem:
+    @cached_property
+    def problem(self: "Faced") -> ReachProblem:
         """The problem that was faced."""
-        return self.trials.problem
+        return self.members[0].trials.problem
 
     @cached_property
     def metrics(self: "Faced") -> dict[str, Estimate]:
@@ -148,12 +148,7 @@ class PooledEvaluation:
     name: str
     members: tuple[Evaluation, ...]
 
-    @property
-    def problem(self) -> ReachProblem:
-        """The problem that was faced."""
-        return self.members[0].problem
-
-    metrics, difference = Evaluation.metrics, Evaluation.difference
+    problem, metrics, difference = Evaluation.problem, Evaluation.metrics, Evaluation.difference
 
     @property
     def worst(self) -> Evaluation:
