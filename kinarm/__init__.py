@@ -8,7 +8,7 @@ from kinarm import _interrupts as _interrupts
 
 __version__ = "2.0.0"
 
-SEMANTICS = "9"
+SEMANTICS = "10"
 """Version of every number that simulator and learners compute from settings and seeds.
 
 It covers starts, goals, trials, rollouts and learning, and identifies finished

@@ -23,6 +23,7 @@ from kinarm.contact_pairs import (
 )
 from kinarm.contact_shapes import ContactShapes
 from kinarm.meshes import coal_shape
+from kinarm.never_touching import NEVER_TOUCH, never_touching
 from kinarm.scene import Scene
 
 
@@ -90,9 +91,9 @@ class ContactModel:
     """An arm in a scene, with the pairs of bodies that are tested for contact.
 
     Left out are neighbours in the chain, bodies that overlap at the home pose,
-    those that the arm's file allows, and the mounting: base and first link
-    against a world that they never touch or always touch. A configuration is an
-    array of shape (n_joints,) [rad or m].
+    those that the arm's file allows, those that are proven never to touch within
+    the joints' limits, and the mounting: the base, and the first link and ground
+    that always touch. A configuration is an array of shape (n_joints,) [rad or m].
 
     Attributes
     ----------
@@ -141,6 +142,17 @@ class ContactModel:
         last = fixed + sum(each.count[1] for each in scene.random_bodies)
         anywhere = {*placed, *range(fixed, last), *(n_shapes + k for k in scene.moving)}
         dropped = uninformative_pairs(arm, geometry, n_shapes, names, anywhere)
+        shapes = ContactShapes.build(arm, scene, candidates, n_shapes)
+        asked = [
+            index
+            for index, (_, other) in enumerate(candidates)
+            if index not in dropped and other not in anywhere
+        ]
+        # What is proven of an arm alone holds in every scene.
+        own = [index for index in asked if candidates[index][1] < n_shapes]
+        for some in (own, asked[len(own) :]):
+            proven = never_touching(arm, geometry, shapes, some)
+            dropped |= dict.fromkeys(proven, NEVER_TOUCH)
         kept = [pair for index, pair in enumerate(candidates) if index not in dropped]
         geometry.removeAllCollisionPairs()
         for pair in kept:

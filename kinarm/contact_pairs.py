@@ -103,8 +103,8 @@ def uninformative_pairs(
 ) -> dict[int, str]:
     """Pairs within the arm that touch at home, and of the mounting, with reasons.
 
-    The mounting is the first link against the world, where it touches never, or the ground always,
-    at 721 positions along the range of the first joint. Some bodies may be anywhere.
+    The mounting is the first link against the ground where it always touches, at 721 positions
+    along the range of the first joint. Some bodies may be anywhere.
     """
     data, geometry_data = arm.model.createData(), make_verdicts_reliable(geometry.createData())
     pairs, objects = list(geometry.collisionPairs), geometry.geometryObjects
@@ -117,19 +117,18 @@ def uninformative_pairs(
 
     within = [index for index, pair in enumerate(pairs) if pair.second < n_shapes]
     resting = touching(arm.home, within)
-    mounting = {
+    always = {
         index
         for index, pair in enumerate(pairs)
         if pair.second >= n_shapes and pair.second not in anywhere
         if objects[pair.first].parentJoint == 1
     }
-    always, never = set(mounting), set(mounting)
     q = arm.home.copy()
-    for position in np.linspace(arm.lower[0], arm.upper[0], MOUNT_SAMPLES if mounting else 0):
+    for position in np.linspace(arm.lower[0], arm.upper[0], MOUNT_SAMPLES):
+        if not always:
+            break
         q[0] = position
-        now = touching(q, mounting)
-        always &= now
-        never -= now
+        always = touching(q, always)
     for index in sorted(always):
         if not isinstance(objects[pairs[index].second].geometry, coal.Halfspace):
             raise ProblemError(
@@ -139,7 +138,6 @@ def uninformative_pairs(
     return {
         **dict.fromkeys(resting, TOUCH_AT_HOME),
         **dict.fromkeys(always, "the mounting: always touch"),
-        **dict.fromkeys(never, "never touch, wherever the first joint is"),
     }
 
 

@@ -67,9 +67,9 @@ class StepContact:
         if contact := model.contact(q):
             return contact
         # It is closer than can be told apart.
-        distances, points = _distances(model, q, range(len(model.pair_names)))
-        nearest = int(np.argmin(distances))
-        return Contact(q, model.pair_names[nearest], points[nearest])
+        nearest = int(np.argmin(_distances(model, q, range(len(model.pair_names)))))
+        found = model.workspace[1].distanceResults[nearest]
+        return Contact(q, model.pair_names[nearest], np.array(found.getNearestPoint1()))
 
     def steps_of(
         self, starts: Array, ends: Array, scenes: Array, taken: NDArray[np.int64]
@@ -167,7 +167,7 @@ def first_share(
     while waiting:
         low, high, pairs = waiting.pop()
         middle, asked = 0.5 * (low + high), asked + 1
-        distances, _ = _distances(*step.at(middle), pairs)
+        distances = _distances(*step.at(middle), pairs)
         reach = motion[pairs] * 0.5 * (high - low)
         near = distances - reach <= TOUCHING + margin
         if near.any():
@@ -178,12 +178,9 @@ def first_share(
     return None, asked
 
 
-def _distances(
-    model: ContactModel, configuration: Array, pairs: Iterable[int]
-) -> tuple[Array, list[Array]]:
-    """Distances of some pairs, and the closest point of the first body of each [m]."""
+def _distances(model: ContactModel, configuration: Array, pairs: Iterable[int]) -> Array:
+    """Distances of some pairs [m], which Coal's data keep."""
     data, placed, *_ = model.workspace
     pin.updateGeometryPlacements(model.arm.model, data, model.geometry, placed, configuration)
-    found = [pin.computeDistance(model.geometry, placed, int(pair)) for pair in pairs]
-    points = [np.array(each.getNearestPoint1()) for each in found]
-    return np.array([each.min_distance for each in found]), points
+    distances = (pin.computeDistance(model.geometry, placed, int(pair)) for pair in pairs)
+    return np.array([each.min_distance for each in distances])

@@ -14,7 +14,7 @@ def test_the_papers_third_task():
     # FACTS of the arm: about 72 % of uniform configurations are free.
     low, high = check.free_starts.ci95
     assert low < 0.72 < high
-    assert len(check.touching) == 28
+    assert len(check.touching) == 24
     assert not check.mirror
 
 

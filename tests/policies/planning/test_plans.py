@@ -48,7 +48,8 @@ def test_it_moves_all_joints_around_the_wall_and_keeps_everything(walled, made):
         assert (np.abs(derivative) <= limit * (1 + 1e-9)).all()
     assert pair_distances(World(walled), q[::4]).min() > 0.01
     assert times[-1] == made.duration
-    assert "33 tested pairs of bodies come within 0.01 m" in made.proven
+    tested = len(World(walled).contact_model.pair_names)
+    assert f"{tested} tested pairs of bodies come within 0.01 m" in made.proven
 
 
 def test_the_same_plan_again(walled, made):
