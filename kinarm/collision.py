@@ -81,7 +81,7 @@ class Step:
         motion: NDArray[np.float64] = (moved * shapes.travel).sum(axis=0)
         if self.before is not None and self.after is not None:
             ways = np.linalg.norm(self.after[:, 13:] - self.before[:, 13:], axis=1)
-            others = shapes.pairs[:, 2] - (len(shapes.capsules) - len(ways))
+            others = shapes.pairs[: len(motion), 2] - (len(shapes.capsules) - len(ways))
             motion += np.where(others < 0, 0.0, ways[np.maximum(others, 0)])
         return motion
 
@@ -149,11 +149,14 @@ class ContactModel:
             if index not in dropped and other not in anywhere
         ]
         # What is proven of an arm alone holds in every scene.
-        own = [index for index in asked if candidates[index][1] < n_shapes]
-        for some in (own, asked[len(own) :]):
-            proven = never_touching(arm, geometry, shapes, some)
-            dropped |= dict.fromkeys(proven, NEVER_TOUCH)
+        within = sum(candidates[index][1] < n_shapes for index in asked)
+        own, others = (
+            never_touching(arm, geometry, shapes, some) for some in (asked[:within], asked[within:])
+        )
+        dropped |= dict.fromkeys(own + others, NEVER_TOUCH)
         kept = [pair for index, pair in enumerate(candidates) if index not in dropped]
+        links = [shape.parentJoint for shape in geometry.geometryObjects]
+        seen = [candidates[index] for index in others if links[candidates[index][0]] > 1]
         geometry.removeAllCollisionPairs()
         for pair in kept:
             geometry.addCollisionPair(pin.CollisionPair(*pair))
@@ -161,7 +164,7 @@ class ContactModel:
             arm=arm,
             geometry=geometry,
             body_names=names,
-            shapes=ContactShapes.build(arm, scene, kept, n_shapes),
+            shapes=ContactShapes.build(arm, scene, kept, n_shapes, seen),
             left_out={
                 (names[first], names[second]): dropped[index]
                 for index, (first, second) in enumerate(candidates)

@@ -52,8 +52,9 @@ class ContactShapes(NamedTuple):
     around : ndarray, shape (n_own, 7)
         Capsule around each of the arm's shapes: middle and half of its axis
         (3 + 3) in its frame, radius [m].
-    pairs : ndarray of int, shape (n_pairs, 3)
-        Kind, index of a moving shape of the arm, and index of the other shape.
+    pairs : ndarray of int, shape (n_pairs + n_seen, 3)
+        Kind, index of a moving shape of the arm, and index of the other shape:
+        of the pairs that are tested, then of others that are only seen.
     travel : ndarray, shape (n_joints, n_pairs)
         Bound on how far a joint moves the shapes of a pair relative to each
         other [m/rad, or m/m]; of those that equal their body, its corners.
@@ -76,11 +77,11 @@ class ContactShapes(NamedTuple):
         Lower and upper ends of the corners [m].
     balls : ndarray, shape (n_bodies, 4)
         Centre and radius of a ball about the corners [m].
-    planes : ndarray of int, shape (n_pairs, 5)
+    planes : ndarray of int, shape (n_pairs + n_seen, 5)
         Carrier of the separating plane; mover against it; its first axis, and
         the one after the last; frame of the plane, which is the world's for
         bodies that rest.
-    proxies : ndarray of int, shape (n_pairs, 2, 2)
+    proxies : ndarray of int, shape (n_pairs + n_seen, 2, 2)
         Bodies that stand for these two: in every step, and where it is close.
     farthest : ndarray, shape (n_actuated,)
         Largest entry of each of these rows of ``travel``.
@@ -89,6 +90,8 @@ class ContactShapes(NamedTuple):
         rotation matrix, position [m].
     moving : ndarray of int, shape (n_moving,)
         Rows of ``placed`` of bodies that move.
+    near : ndarray of int, shape (n_near,)
+        Rows of ``planes`` of pairs with the scene's bodies, half-spaces last.
     """
 
     capsules: Array
@@ -108,6 +111,7 @@ class ContactShapes(NamedTuple):
     farthest: Array
     placed: Array
     moving: NDArray[np.int64]
+    near: NDArray[np.int64]
 
     @classmethod
     def build(
@@ -116,6 +120,7 @@ class ContactShapes(NamedTuple):
         scene: Scene,
         pairs: list[tuple[int, int]],
         n_shapes: int,
+        seen: Sequence[tuple[int, int]] = (),
     ) -> "ContactShapes":
         """Flatten the shapes of an arm in a scene.
 
@@ -127,6 +132,8 @@ class ContactShapes(NamedTuple):
             Shapes of each pair; the scene's bodies count from ``n_shapes``.
         n_shapes : int
             The arm's shapes.
+        seen : sequence of tuple
+            More pairs with the scene's bodies, which are seen, but not tested.
         """
         objects = list(arm.geometry.geometryObjects)
         surroundings = [unit_body(body) for body in scene.bodies]
@@ -136,7 +143,7 @@ class ContactShapes(NamedTuple):
         edges, frames = np.cumsum([0, *map(len, blocks)]), np.array(links, dtype=np.int64)
         rows, planes, proxies = [], [], []
         travel = np.zeros((arm.n_joints, len(pairs)))
-        for column, (first, second) in enumerate(pairs):
+        for column, (first, second) in enumerate([*pairs, *seen]):
             within = second < n_shapes
             kind = BETWEEN_CAPSULES if within else surroundings[second - n_shapes].kind
             rows.append((kind, first, second))
@@ -152,7 +159,7 @@ class ContactShapes(NamedTuple):
             fine = bodies[finer[mover]]
             # Bodies about a shape take turns, so that all of its points count.
             aside = fine.rounding if fine.excess > 0 else 0.0
-            for axis in range(base, links[mover]):
+            for axis in range(base, links[mover] if column < len(pairs) else base):
                 speed = point_speed(arm.chain, axis, links[mover], fine.corners)
                 travel[axis, column] = speed + (0.0 if arm.chain.prismatic[axis] else aside)
         extents = np.array(
@@ -163,6 +170,8 @@ class ContactShapes(NamedTuple):
             np.sqrt(np.square(body.corners - middle).sum(axis=1).max())
             for body, middle in zip(bodies, middles, strict=True)
         ]
+        near = [index for index, (_, _, other) in enumerate(rows) if other >= n_shapes]
+        near.sort(key=lambda index: (rows[index][0] == WITH_HALFSPACE, rows[index][1:]))
         exact = [isinstance(each.geometry, coal.Capsule | coal.Sphere) for each in objects]
         exact += [each.excess == 0 for each in surroundings]
         inner = map(inner_capsule, objects)
@@ -188,6 +197,7 @@ class ContactShapes(NamedTuple):
             farthest=travel[: arm.n_actuated].max(axis=1, initial=0.0),
             placed=np.array(list(map(placed_row, scene.bodies, surroundings))).reshape(-1, 16),
             moving=np.array(scene.moving, dtype=np.int64),
+            near=np.array(near, dtype=np.int64),
         )
 
 

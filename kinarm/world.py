@@ -287,7 +287,7 @@ class World(GoalKinematics, StepContact):
             doubt=np.zeros(n, dtype=np.int64),
             touched=np.zeros(n, dtype=np.int64),
             cleared=np.zeros(n, dtype=bool),
-            planes=np.zeros((n, len(shapes.pairs), PLANE)),
+            planes=np.zeros((n, shapes.travel.shape[1], PLANE)),
             scenes=np.tile(shapes.placed, (n if own_scenes else 0, 1, 1)),
             plant=plants,
             drive=self.plants.at_rest(plants, starts[: len(plants)]),

@@ -80,7 +80,7 @@ def prove_step(shapes: ContactShapes, tested: int, poses: Array, block: Block) -
         bend += block.twist[0, axis] * shapes.farthest[axis]
     bent, least, share, n_open = 0.125 * bend, bend + 1.0, tested_from(tested), 0
     place_axes(shapes, poses, block.axes)
-    for pair in range(shapes.planes.shape[0]):
+    for pair in range(shapes.travel.shape[1]):
         before = block.planes[pair, GAP]
         after = axis_above(shapes, pair, poses, block.axes, block.planes, pair)
         bound = min(after, before + share * (after - before)) - bent
@@ -97,7 +97,7 @@ def prove_step(shapes: ContactShapes, tested: int, poses: Array, block: Block) -
                 n_open += 1
         block.planes[pair, GAP] = after
         least = min(least, bound)
-    block.open[shapes.planes.shape[0]] = n_open
+    block.open[shapes.travel.shape[1]] = n_open
     return least
 
 
@@ -110,7 +110,7 @@ def renew_planes(
     ``stale`` says whose steps are to be proven. Poses are ``before`` the step and at the target.
     """
     least = 0.0 * block.q[0, 0] + 1.0
-    n_pairs, share = shapes.planes.shape[0], tested_from(tested)
+    n_pairs, share = shapes.travel.shape[1], tested_from(tested)
     for index in range(block.open[n_pairs]):
         pair = block.open[index]
         bound = block.bound[pair]
@@ -183,7 +183,7 @@ def prove_alone(
         for i in range(3):
             alone.moved[k, i] = as_numbers(before)[frame, 13 + i, lane]
             alone.moved[k, 3 + i] = as_numbers(poses)[frame, 13 + i, lane]
-    at_start, n_open, all_open, n_left = False, 0, 0, block.open[shapes.planes.shape[0]]
+    at_start, n_open, all_open, n_left = False, 0, 0, block.open[shapes.travel.shape[1]]
     for index in range(-n_left if quick else 0, n_left):
         pair = block.open[index + n_left if index < 0 else index]
         if quick and alone.suspected[pair] == (index >= 0):
@@ -318,7 +318,7 @@ def first_contact(
     parts = tested if tested > 0 else INTERVALS
     place_between(k, parts, lane, chain, shapes, block, alone, alone.before)
     enough = DEPTH if tested > 0 else -SURE_CONTACT
-    for pair in range(shapes.pairs.shape[0]):
+    for pair in range(shapes.travel.shape[1]):
         if approach(shapes, pair, alone.before)[0] > enough:
             return pair + 1
         verdict = verdict_of(pair, lane, -1.0, shapes, block, alone)

@@ -110,7 +110,7 @@ def advance(counter: NDArray[np.int64], session: Session) -> int:
     block, row, lower, upper = session.block, session.block.row, chain.lower, chain.upper
     shielded, looks = rules.shield.shape[0] > 0, block.holds.shape[0] > 0
     n_actuated = rules.step_limit.shape[0]
-    n_episodes, n_pairs = episodes.status.shape[0], shapes.planes.shape[0]
+    n_episodes, n_pairs = episodes.status.shape[0], shapes.travel.shape[1]
     shared, summed = shared_policy(n_episodes, control), block.moments.shape[1]
     before, poses = block.before, block.after
     for lane in range(LANES):

@@ -24,7 +24,7 @@ def prove_configuration(
     """1 if an episode's configuration is proven free, -1 if it touches something, else 0."""
     found, plane, planes = 1, alone.plane, as_numbers(block.planes)
     take_rows(poses, lane, alone.before)
-    for pair in range(shapes.planes.shape[0]):
+    for pair in range(shapes.travel.shape[1]):
         if is_apart(planes[pair, GAP, lane]):
             continue
         verdict = verdict_of(pair, lane, -1.0, shapes, block, alone)
@@ -48,7 +48,7 @@ def prove_configurations(
     least, depth = 0.0 * block.q[0, 0] + 1.0, 0.0 * block.q[0, 0] - 1.0
     if hasty:
         place_axes(shapes, poses, block.axes)
-    for pair in range(shapes.planes.shape[0]):
+    for pair in range(shapes.travel.shape[1]):
         bound = 0.0 * depth - math.inf
         if hasty:
             bound = axes_apart(shapes, pair, poses, block.axes)
@@ -122,7 +122,7 @@ def screen(
                 apart, touched = prove_configurations(shapes, filled, True, block, alone)
             else:
                 depth = 0.0 * block.q[0, 0] - 1.0
-                for pair in range(shapes.pairs.shape[0]):
+                for pair in range(shapes.travel.shape[1]):
                     if shapes.pairs[pair, 0] == WITH_HALFSPACE:
                         depth = max(depth, approach(shapes, pair, block.after)[0])
                 apart, touched = 0, lane_bits(depth > DEPTH)

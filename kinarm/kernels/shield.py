@@ -338,7 +338,7 @@ def comes_to_rest(passed: float, warned: float, session: Session) -> bool:
             calm = calm & (plant[0, DELAY] <= passed + 1.0)
             # How far it may still go.
             ahead.action[0, axis] = abs(error) + swing / rate
-    for pair in range(shapes.planes.shape[0]):
+    for pair in range(shapes.travel.shape[1]):
         left = ahead.planes[pair, GAP]
         for axis in range(shapes.planes[pair, 2], shapes.planes[pair, 3]):
             left = left - shapes.travel[axis, pair] * ahead.action[0, axis]

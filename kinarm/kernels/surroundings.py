@@ -8,7 +8,7 @@ from typing import NamedTuple
 from kinarm.kernels.compiling import Array, Vector, helper
 from kinarm.kernels.kinematics import point_jacobian, rotated, rotated_back
 from kinarm.kernels.lanes import any_lane, select
-from kinarm.kernels.planes import FINE, foot, height_above, is_placed, propose
+from kinarm.kernels.planes import FINE, foot, height_above, propose
 from kinarm.kernels.rough_bounds import ball_gap
 from kinarm.kernels.session import Session
 
@@ -54,15 +54,13 @@ def write_proximity(session: Session, seen: Seen, start: int, count: int) -> Non
     """
     shapes, block, poses = session.shapes, session.block, seen.poses
     limit, jacobian, planes = session.rules.step_limit, block.jacobian, block.planes
-    row, nothing = shapes.planes.shape[0], 0.0 * poses[0, 13]
+    row, nothing = shapes.travel.shape[1], 0.0 * poses[0, 13]
     for link in range(1, count + 1):
         least, x, y, z = nothing + NEAR, nothing, nothing, nothing
         px, py, pz = nothing, nothing, nothing
-        for pair in range(row):
-            frame = shapes.bodies[shapes.planes[pair, 0], 2]
+        for k in range(shapes.near.shape[0]):
+            pair = shapes.near[k]
             if shapes.bodies[shapes.planes[pair, 1], 2] != link:
-                continue
-            if not is_placed(shapes, frame, poses):
                 continue
             within = ball_gap(shapes, pair, poses) < least
             if any_lane(within):

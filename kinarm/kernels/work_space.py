@@ -32,7 +32,7 @@ def work_space(**sizes: int) -> tuple[Block, Alone]:
 
 def sizes_of(shapes: ContactShapes) -> dict[str, int]:
     """Sizes for `layouts` of what may touch."""
-    counted = {"n_pairs": shapes.pairs, "n_own": shapes.around, "n_placed": shapes.placed}
+    counted = {"n_pairs": shapes.travel.T, "n_own": shapes.around, "n_placed": shapes.placed}
     return {name: len(each) for name, each in counted.items()}
 
 

@@ -19,7 +19,7 @@ def prove(chain, shapes, tested, starts, targets, block, alone, bounds, found):
             put(targets, i, block.target, 0, lane)
         forward_kinematics(chain, block.q, 0, block.before)
         forward_kinematics(chain, block.target, 0, block.after)
-        for pair in range(shapes.planes.shape[0]):
+        for pair in range(shapes.travel.shape[1]):
             propose(shapes, pair, block.before, block.planes, pair)
             height = height_above(shapes, pair, EVERYDAY, block.before, block.planes, pair)
             block.planes[pair, GAP] = height

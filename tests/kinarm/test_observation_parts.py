@@ -1,6 +1,7 @@
 """Observations as a choice of the problem: each part against Pinocchio, Coal and by hand."""
 
 from dataclasses import replace
+from itertools import product, starmap
 
 import coal
 import numpy as np
@@ -126,9 +127,14 @@ class TestProximity:
         q = random_configurations(simulator, 5, 120)
         q = q[~world.in_contact(q)]
         seen = world.observe(q, np.zeros((len(q), 3))).reshape(len(q), simulator.arm.n_joints, -1)
-        geometry, of_arm = world.contact_model.geometry, simulator.arm.geometry.ngeoms
-        data, links = geometry.createData(), [g.parentJoint for g in geometry.geometryObjects]
-        gaps = []
+        geometry, of_arm = world.contact_model.geometry.copy(), simulator.arm.geometry.ngeoms
+        links = [g.parentJoint for g in geometry.geometryObjects]
+        # Also pairs that are not tested, since they never touch; but not of the first link.
+        above = [k for k in range(of_arm) if links[k] > 1]
+        for pair in starmap(pin.CollisionPair, product(above, range(of_arm, len(links)))):
+            if not geometry.existCollisionPair(pair):
+                geometry.addCollisionPair(pair)
+        data, gaps = geometry.createData(), []
         for k, configuration in enumerate(q):
             pin.computeDistances(model, model.createData(), geometry, data, configuration)
             nearest = np.full(simulator.arm.n_joints, NEAR)

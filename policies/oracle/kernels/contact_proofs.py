@@ -87,7 +87,7 @@ def overlaps(
     bodies, pairs, travel, prismatic = shapes.bodies, shapes.pairs, shapes.travel, chain.prismatic
     n = half.shape[0]
     proven: bool = wanted & (half[0] < 0.0)
-    for pair in range(pairs.shape[0]):
+    for pair in range(travel.shape[1]):
         kind, i, j = pairs[pair, 0], pairs[pair, 1], pairs[pair, 2]
         if kind != BETWEEN_CAPSULES and not shapes.exact[j]:
             continue

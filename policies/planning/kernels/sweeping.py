@@ -53,7 +53,7 @@ def sweep(
         for joint in range(ends.shape[1]):
             block.former[0, joint] = 0.5 * (block.q[0, joint] + block.target[0, joint])
         forward_kinematics(chain, block.former, 0, block.after)
-        for pair in range(shapes.planes.shape[0]):
+        for pair in range(shapes.travel.shape[1]):
             motion = 0.0 * block.q[0, 0]
             for moved in range(shapes.planes[pair, 2], shapes.planes[pair, 3]):
                 turn = abs(block.target[0, moved] - block.q[0, moved])
@@ -63,7 +63,7 @@ def sweep(
         forward_kinematics(chain, block.target, 0, block.after)
         twist_step(block)
         least, n_open = 0.0 * block.q[0, 0] + 1.0, 0
-        for pair in range(shapes.planes.shape[0]):
+        for pair in range(shapes.travel.shape[1]):
             far = block.bound[pair]
             if not any_lane(~is_apart(far)):
                 continue
@@ -79,7 +79,7 @@ def sweep(
             least = min(least, bound)
             block.open[n_open] = pair
             n_open += 1
-        block.open[shapes.planes.shape[0]] = n_open
+        block.open[shapes.travel.shape[1]] = n_open
         free = lane_bits(is_apart(least))
         for lane in range(min(LANES, parts - part)):
             if free >> lane & 1:
