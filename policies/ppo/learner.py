@@ -144,12 +144,8 @@ class PPOTraining:
         An episode that the time limit cut short would go on: its last reward gets
         the value of its last observation.
         """
-        config, networks, arms, log_std = (
-            self.config,
-            self.networks,
-            self.arms,
-            self.networks.log_std,
-        )
+        config, networks, arms = self.config, self.networks, self.arms
+        log_std = networks.log_std
         least = -np.inf if config.replay_log_std is None else config.replay_log_std
         shape = (config.n_steps, config.n_envs)
         observations = np.empty((*shape, arms.simulator.n_observations), dtype=np.float32)
