@@ -115,9 +115,11 @@ def learning_curves(study: "Study") -> "Figure | None":
         return None
     size = 10.0, 1.2 + 3.2 * len(problems)
     figure, panels = panels_figure(size, len(problems), 2, sharey=True)
+    numbers: dict[Any, int] = {}  # of lines that are alike in all rows
     for (problem, groups), row in zip(problems.items(), panels, strict=True):
-        for number, group in enumerate(groups[:LINES]):
-            _draw_curves(row, group, number)
+        for group in groups[:LINES]:
+            alike = group.entry.name, *group.choices.items()
+            _draw_curves(row, group, numbers.setdefault(alike, len(numbers)))
         for axes in row:
             axes.axhline(groups[0].reachable, color="#444444", linestyle=":", lw=1)
             axes.set(ylim=(0, 1.02), title=problem, xscale="log")
