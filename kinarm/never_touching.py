@@ -14,7 +14,7 @@ from kinarm._files import cached_arrays
 from kinarm.arm import Arm
 from kinarm.contact_shapes import ContactShapes
 
-NEVER_TOUCH = "never touch, wherever the joints between them are"
+NEVER_TOUCH = "proven never to touch"
 """Why such a pair is not tested."""
 
 PROOFS = 1

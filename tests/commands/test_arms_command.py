@@ -65,7 +65,7 @@ def test_show(run):
         "  axis_6: -360 to 360 deg, 720 deg/s; not actuated, stays at home",
         "  shoulder: capsule",
         "  base and shoulder: neighbours",
-        "  elbow and hand: never touch, wherever the joints between them are",
+        "  elbow and hand: proven never to touch",
         "pairs that are tested (16), and how often they touch",
     ):
         assert line in answer.out.splitlines(), answer.out
