@@ -10,10 +10,10 @@ from kinarm.contact_shapes import WITH_HALFSPACE, ContactShapes
 from kinarm.kernels.compiling import Array, helper, inlined, lean_kernel
 from kinarm.kernels.kinematics import forward_kinematics, to_world
 from kinarm.kernels.lane_copies import put, put_scene, take, take_rows
-from kinarm.kernels.lanes import LANES, any_lane, as_numbers, lane_bits
+from kinarm.kernels.lanes import LANES, any_lane, as_numbers, lane_bits, select
 from kinarm.kernels.planes import DEPTH, EVERYDAY, GAP, approach, height_above, lay_plane
 from kinarm.kernels.proof import is_apart, verdict_of
-from kinarm.kernels.rough_bounds import axes_apart, place_axes
+from kinarm.kernels.rough_bounds import axes_apart, axis_above, place_axes
 from kinarm.kernels.work_space import Alone, Block
 
 
@@ -46,8 +46,7 @@ def prove_configurations(
     """
     poses, planes = block.after, block.planes
     least, depth = 0.0 * block.q[0, 0] + 1.0, 0.0 * block.q[0, 0] - 1.0
-    if hasty:
-        place_axes(shapes, poses, block.axes)
+    place_axes(shapes, poses, block.axes)
     for pair in range(shapes.travel.shape[1]):
         bound = 0.0 * depth - math.inf
         if hasty:
@@ -57,7 +56,11 @@ def prove_configurations(
             if hasty:
                 depth = max(depth, overlap)
             lay_plane(shapes, pair, poses, along, planes, pair)
-            bound = max(bound, height_above(shapes, pair, EVERYDAY, poses, planes, pair))
+            bound = max(bound, axis_above(shapes, pair, poses, block.axes, planes, pair))
+            unproven = ~is_apart(bound)
+            if any_lane(unproven):
+                closer = height_above(shapes, pair, EVERYDAY, poses, planes, pair)
+                bound = select(unproven, max(bound, closer), bound)
         least = min(least, bound)
         planes[pair, GAP] = bound
     free, touched = lane_bits(is_apart(least)), lane_bits(depth > DEPTH)
