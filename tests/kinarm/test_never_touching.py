@@ -19,7 +19,7 @@ RADIUS, REACH = 0.05, 0.3
 def reasons(write_robot, make_joint, make_collision):
     """Why the two balls are not tested, by the place of the base's and the limits, or None."""
 
-    def load(x, y, *, limits=(WIDE, WIDE), between=""):
+    def load(x, y, *, limits=(WIDE, WIDE), between="", end="0.1 0 0"):
         joints = [
             make_joint(xyz="0 0 0.3", axis="0 0 1", limit=limits[0]),
             make_joint(xyz="0.2 0 0", axis="0 0 1", limit=limits[1]),
@@ -28,7 +28,7 @@ def reasons(write_robot, make_joint, make_collision):
         ball = f'<sphere radius="{RADIUS}"/>'
         shapes = {
             0: make_collision(ball, xyz=f"{x} {y} 0.3"),
-            len(joints): make_collision(ball, xyz="0.1 0 0"),
+            len(joints): make_collision(ball, xyz=end),
         }
         contact = contact_on_bare_ground(Arm.load(write_robot(joints, shapes)))
         return contact.left_out.get(("link_0", f"link_{len(joints)}"))
@@ -51,6 +51,17 @@ def test_joints_may_be_somewhat_beyond_their_limits(reasons, beyond, reason):
     away = REACH + RADIUS
     angle = 0.5 + BEYOND + 2 * np.arcsin(RADIUS / away) + beyond
     assert reasons(away * np.cos(angle), away * np.sin(angle), limits=limits) == reason
+
+
+def test_a_bound_that_is_nearly_attained_is_not_too_small(reasons):
+    """One joint moves a ball straight at the other, which it meets at the end of its range."""
+    limit = WIDE.replace("3.2", "0.15")
+    angle = 0.15 + BEYOND + 2 * np.arcsin((2 * RADIUS - CLOSE) / 0.4)
+    x, y = 0.2 * np.cos(angle), 0.2 * np.sin(angle)
+    assert reasons(x, y, limits=(limit, WIDE), end="0 0 0") is None
+    angle += 0.01 + CLOSE / 0.1
+    x, y = 0.2 * np.cos(angle), 0.2 * np.sin(angle)
+    assert reasons(x, y, limits=(limit, WIDE), end="0 0 0") == NEVER_TOUCH
 
 
 def test_many_joints_between_are_not_gone_through(reasons):
