@@ -154,17 +154,17 @@ class ContactModel:
             never_touching(arm, geometry, shapes, some) for some in (asked[:within], asked[within:])
         )
         dropped |= dict.fromkeys(own + others, NEVER_TOUCH)
-        kept = [pair for index, pair in enumerate(candidates) if index not in dropped]
+        kept = [index for index in range(len(candidates)) if index not in dropped]
         links = [shape.parentJoint for shape in geometry.geometryObjects]
-        seen = [candidates[index] for index in others if links[candidates[index][0]] > 1]
+        seen = [index for index in others if links[candidates[index][0]] > 1]
         geometry.removeAllCollisionPairs()
-        for pair in kept:
-            geometry.addCollisionPair(pin.CollisionPair(*pair))
+        for index in kept:
+            geometry.addCollisionPair(pin.CollisionPair(*candidates[index]))
         return cls(
             arm=arm,
             geometry=geometry,
             body_names=names,
-            shapes=ContactShapes.build(arm, scene, kept, n_shapes, seen),
+            shapes=shapes.chosen(kept, seen),
             left_out={
                 (names[first], names[second]): dropped[index]
                 for index, (first, second) in enumerate(candidates)

@@ -91,7 +91,8 @@ class ContactShapes(NamedTuple):
     moving : ndarray of int, shape (n_moving,)
         Rows of ``placed`` of bodies that move.
     near : ndarray of int, shape (n_near,)
-        Rows of ``planes`` of pairs with the scene's bodies, half-spaces last.
+        Rows of ``planes`` of pairs with the scene's bodies, in the order in which
+        they were built.
     """
 
     capsules: Array
@@ -120,7 +121,6 @@ class ContactShapes(NamedTuple):
         scene: Scene,
         pairs: list[tuple[int, int]],
         n_shapes: int,
-        seen: Sequence[tuple[int, int]] = (),
     ) -> "ContactShapes":
         """Flatten the shapes of an arm in a scene.
 
@@ -132,8 +132,6 @@ class ContactShapes(NamedTuple):
             Shapes of each pair; the scene's bodies count from ``n_shapes``.
         n_shapes : int
             The arm's shapes.
-        seen : sequence of tuple
-            More pairs with the scene's bodies, which are seen, but not tested.
         """
         objects = list(arm.geometry.geometryObjects)
         surroundings = [unit_body(body) for body in scene.bodies]
@@ -143,7 +141,7 @@ class ContactShapes(NamedTuple):
         edges, frames = np.cumsum([0, *map(len, blocks)]), np.array(links, dtype=np.int64)
         rows, planes, proxies = [], [], []
         travel = np.zeros((arm.n_joints, len(pairs)))
-        for column, (first, second) in enumerate([*pairs, *seen]):
+        for column, (first, second) in enumerate(pairs):
             within = second < n_shapes
             kind = BETWEEN_CAPSULES if within else surroundings[second - n_shapes].kind
             rows.append((kind, first, second))
@@ -159,7 +157,7 @@ class ContactShapes(NamedTuple):
             fine = bodies[finer[mover]]
             # Bodies about a shape take turns, so that all of its points count.
             aside = fine.rounding if fine.excess > 0 else 0.0
-            for axis in range(base, links[mover] if column < len(pairs) else base):
+            for axis in range(base, links[mover]):
                 speed = point_speed(arm.chain, axis, links[mover], fine.corners)
                 travel[axis, column] = speed + (0.0 if arm.chain.prismatic[axis] else aside)
         extents = np.array(
@@ -170,8 +168,6 @@ class ContactShapes(NamedTuple):
             np.sqrt(np.square(body.corners - middle).sum(axis=1).max())
             for body, middle in zip(bodies, middles, strict=True)
         ]
-        near = [index for index, (_, _, other) in enumerate(rows) if other >= n_shapes]
-        near.sort(key=lambda index: (rows[index][0] == WITH_HALFSPACE, rows[index][1:]))
         exact = [isinstance(each.geometry, coal.Capsule | coal.Sphere) for each in objects]
         exact += [each.excess == 0 for each in surroundings]
         inner = map(inner_capsule, objects)
@@ -197,7 +193,20 @@ class ContactShapes(NamedTuple):
             farthest=travel[: arm.n_actuated].max(axis=1, initial=0.0),
             placed=np.array(list(map(placed_row, scene.bodies, surroundings))).reshape(-1, 16),
             moving=np.array(scene.moving, dtype=np.int64),
-            near=np.array(near, dtype=np.int64),
+            near=np.flatnonzero([second >= n_shapes for _, second in pairs]),
+        )
+
+    def chosen(self, tested: Sequence[int], seen: Sequence[int]) -> "ContactShapes":
+        """The same shapes with some of the pairs, of which some are tested, others only seen."""
+        rows = np.array([*tested, *seen], dtype=np.int64)
+        travel, order = np.ascontiguousarray(self.travel[:, tested]), rows.argsort()
+        return self._replace(
+            pairs=self.pairs[rows],
+            planes=self.planes[rows],
+            proxies=self.proxies[rows],
+            travel=travel,
+            farthest=travel[: len(self.farthest)].max(axis=1, initial=0.0),
+            near=order[np.isin(rows[order], self.near)],
         )
 
 
