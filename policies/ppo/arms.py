@@ -159,25 +159,3 @@ class TrainingArms:
         episodes.q[rows] = self._start[rows]
         self.simulator.begin(episodes, rows)
         self._total[rows] = 0.0
-
-
-def estimate_advantages(
-    rewards: Numbers, values: Numbers, going_on: Numbers, gamma: float, gae_lambda: float
-) -> Numbers:
-    """Generalised advantage estimation (Schulman et al. 2016).
-
-    Parameters
-    ----------
-    rewards, going_on : ndarray of float32, shape (n_steps, n_envs)
-        ``going_on`` is 0 where an episode ended, else 1.
-    values : ndarray of float32, shape (n_steps + 1, n_envs)
-        Values before each step and after the last one.
-    gamma, gae_lambda : float
-        Discount per step, and decay of the estimate.
-    """
-    advantages = np.empty_like(rewards)
-    later = np.zeros_like(rewards[0])
-    for step in reversed(range(len(rewards))):
-        delta = rewards[step] + gamma * values[step + 1] * going_on[step] - values[step]
-        advantages[step] = later = delta + gamma * gae_lambda * going_on[step] * later
-    return advantages

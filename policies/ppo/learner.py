@@ -15,7 +15,7 @@ from kinarm.policies.learners import CurvePoint
 from kinarm.policies.library import layer_widths, starting_policy, statistics
 from kinarm.policies.normalizer import Normalizer
 from kinarm.policies.ppo import EpisodeStates, PPOConfig, PPOState
-from kinarm.policies.ppo.arms import TrainingArms, estimate_advantages
+from kinarm.policies.ppo.arms import TrainingArms
 from kinarm.policies.ppo.kernels.layers import Numbers
 from kinarm.policies.ppo.kernels.update import (
     Experience,
@@ -201,3 +201,25 @@ class PPOTraining:
             run_rows(add_gradients, PARTS, BALANCED_STEPS, self.threads, *given)
             descend(*nets, *moments, gradients, learning_rate, config.max_grad_norm, step)
         return [networks.gathered(each) for each in (networks.weights, *moments)]
+
+
+def estimate_advantages(
+    rewards: Numbers, values: Numbers, going_on: Numbers, gamma: float, gae_lambda: float
+) -> Numbers:
+    """Generalised advantage estimation (Schulman et al. 2016).
+
+    Parameters
+    ----------
+    rewards, going_on : ndarray of float32, shape (n_steps, n_envs)
+        ``going_on`` is 0 where an episode ended, else 1.
+    values : ndarray of float32, shape (n_steps + 1, n_envs)
+        Values before each step and after the last one.
+    gamma, gae_lambda : float
+        Discount per step, and decay of the estimate.
+    """
+    advantages = np.empty_like(rewards)
+    later = np.zeros_like(rewards[0])
+    for step in reversed(range(len(rewards))):
+        delta = rewards[step] + gamma * values[step + 1] * going_on[step] - values[step]
+        advantages[step] = later = delta + gamma * gae_lambda * going_on[step] * later
+    return advantages

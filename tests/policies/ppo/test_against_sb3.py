@@ -14,8 +14,7 @@ from stable_baselines3.common.buffers import RolloutBuffer
 from stable_baselines3.common.logger import Logger
 
 from kinarm.policies import PPOConfig, recipe, sb3_vec_env
-from kinarm.policies.ppo.arms import estimate_advantages
-from kinarm.policies.ppo.learner import PPOTraining
+from kinarm.policies.ppo.learner import PPOTraining, estimate_advantages
 from kinarm.policies.ppo.networks import initial_parameters, orthogonal, split_parameters
 from kinarm.problem import PROBLEMS
 from kinarm.task import RewardWeights
