@@ -207,7 +207,7 @@ class Study:
         """Read the folder again."""
         if self.experiment.search:
             self.runs = self._planned()
-        for name in ("finished", "bounds", "_groups"):
+        for name in ("finished", "bounds", "varied", "_groups"):
             self.__dict__.pop(name, None)
 
     def status(self) -> list[str]:
@@ -306,29 +306,24 @@ class Study:
             parts.append(f"{field.rpartition('.')[2]}={shown(value)}")
         return " ".join(parts) or f"{names['learner']} {names['recipe']} {names['problem']}"
 
-    @property
+    @cached_property
     def varied(self) -> list[str]:
         """Fields that vary between the finished trainings."""
         return list(dict.fromkeys(field for run in self.finished for field in run.choices))
 
     def rows(self) -> list[dict[str, Any]]:
         """One row per finished training."""
-        fields = self.varied
         rows = []
         for run, trained in self.finished.items():
-            clock = trained.clock
             bounds = self.bounds.get(run.config.problem.unseen.digest)
-            outcomes = Outcomes((trained.outcomes,), bounds)
             rows.append(
                 {
-                    **({"entry": run.entry.name} if self.experiment.entries else {}),
-                    **identity(run),
-                    **{field: run.choices.get(field) for field in fields},
+                    **self._named(run),
                     "iterations": trained.last.iteration,
                     "environment_steps": trained.last.environment_steps,
-                    "seconds": clock.seconds,
-                    "processor_seconds": clock.processor_seconds,
-                    **figures_of(outcomes),
+                    "seconds": trained.clock.seconds,
+                    "processor_seconds": trained.clock.processor_seconds,
+                    **figures_of(Outcomes((trained.outcomes,), bounds)),
                     "key": run.key,
                 }
             )
@@ -336,12 +331,9 @@ class Study:
 
     def curve_rows(self) -> list[dict[str, Any]]:
         """One row per point of a learning curve, the ends included."""
-        fields = self.varied
         return [
             {
-                "entry": run.entry.name,
-                **identity(run),
-                **{field: run.choices.get(field) for field in fields},
+                **self._named(run),
                 **point._asdict(),
                 "seconds": seconds,
                 "processor_seconds": processor_seconds,
@@ -349,3 +341,8 @@ class Study:
             for run, trained in self.finished.items()
             for point, seconds, processor_seconds in trained.timed_curve
         ]
+
+    def _named(self, run: Run) -> dict[str, Any]:
+        """Who was trained on what, and what varies, as rows begin."""
+        entry = {"entry": run.entry.name} if self.experiment.entries else {}
+        return entry | identity(run) | {field: run.choices.get(field) for field in self.varied}
