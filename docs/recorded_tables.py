@@ -2,7 +2,7 @@
 
 import json
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -141,24 +141,24 @@ def plans_table() -> str:
 def factors_table() -> str:
     """What a change of a recipe is worth, in percentage points of success."""
     rows = []
-    record = json.loads((RESULTS / "ars_factors" / "learners.json").read_text(encoding="utf-8"))
-    titles = {each["name"]: each["title"] for each in record["learners"]}
-    first, *others = record["results"]
-    for row in (first, *others):
-        success, change = row["success"], row["success"]["value"] - first["success"]["value"]
-        low, high = success["ci95"]
-        rows.append(
-            [
-                f"`{titles[first['learner']]}`",
-                "as it is" if row is first else titles[row["learner"]],
-                f"{100 * success['value']:.1f} ({100 * low:.1f}..{100 * high:.1f})",
-                "" if row is first else f"{100 * change:+.1f}",
-                f"{100 * min(row['success_each']):.1f}",
-                f"{100 * row['collision']['value']:.1f}",
-            ]
-        )
-    heads = ["recipe", "change", "success % (95 %)", "points", "worst seed %", "collision %"]
+    for study in ("ars_factors", "ppo_factors"):
+        record = json.loads((RESULTS / study / "results.json").read_text(encoding="utf-8"))
+        first, *others = record["experiment"]["entries"]
+        titles = {first["name"]: "as it is"} | {each["name"]: each["title"] for each in others}
+        for row in record["results"]:
+            success, collision = (_numbers(row[name]) for name in ("success", "collision"))
+            shares = [_percent(success), f"{100 * min(row['success_each']):.1f}"]
+            than = row["difference"]
+            points = _percent(_numbers(than["success"]), "+.1f") if than else ""
+            change = [f"`{first['recipe']}`", titles[row["entry"]], points]
+            rows.append([*change, *shares, f"{100 * collision[0]:.1f}"])
+    heads = ["recipe", "change", "points (95 %)", "success % (95 %)", "worst seed %", "collision %"]
     return markdown_table(heads, rows)
+
+
+def _numbers(estimate: Mapping[str, Any]) -> list[float]:
+    """A recorded estimate and the ends of its interval."""
+    return [estimate["value"], *estimate["ci95"]]
 
 
 def board() -> dict[str, Any]:
@@ -188,7 +188,7 @@ def _leaderboard_row(row: Mapping[str, Any]) -> list[str]:
     return [
         row["problem"],
         f"`{row['policy']}`",
-        _success_of(row),
+        _percent(row["success"]),
         *("" if each is None else f"{100 * each:.1f}" for each in shares),
         "" if row["step_ratio"] is None else f"{row['step_ratio']:.2f}",
         str(len(row["seeds"])),
@@ -196,10 +196,10 @@ def _leaderboard_row(row: Mapping[str, Any]) -> list[str]:
     ]
 
 
-def _success_of(row: Mapping[str, Any]) -> str:
-    """Success in percent, with its interval if it is known."""
-    success, *interval = (f"{100 * each:.1f}" for each in row["success"])
-    return f"{success} ({'..'.join(interval)})" if interval else success
+def _percent(estimate: Sequence[float], digits: str = ".1f") -> str:
+    """An estimate in percent, with its interval if it is known."""
+    value, *interval = (f"{100 * each:{digits}}" for each in estimate)
+    return f"{value} ({'..'.join(interval)})" if interval else value
 
 
 def failures_table() -> str:
@@ -247,7 +247,8 @@ def skills_table() -> str:
         shown = []
         for row in (bare, behind):
             worst = min(share for share, _ in row["seeds"].values())
-            shown += [_success_of(row), f"{100 * worst:.1f}", f"{100 * row['collision']:.2f}"]
+            shown += [_percent(row["success"]), f"{100 * worst:.1f}"]
+            shown.append(f"{100 * row['collision']:.2f}")
         ratio = "" if behind["step_ratio"] is None else f"{behind['step_ratio']:.2f}"
         alone, oracle = (f"{100 * behind[name]:.1f}" for name in ("control", "oracle"))
         end = [alone, oracle, ratio, f"{behind['speed']:.2f}", f"{behind['minutes']:.1f}"]

@@ -34,7 +34,7 @@ EXCEPTIONS = {
     r"kinarm-bench": "measures for minutes; tests/commands/test_bench_command.py",
     r"kinarm-reproduce|.*ReproductionRequest": "trains for half an hour; tests/commands",
     r"kinarm-study .*--(ray|slurm)": "needs a cluster; tests/evaluation/experiments",
-    r"kinarm-study (learners|policies|ars_factors|search)": "trains for hours; tests/frozen",
+    r"kinarm-study (learners|policies|\w+_factors|search)": "trains for hours; tests/frozen",
     r"kinarm-train .*search/best": "needs what that search found",
     r"kinarm-eval .*model\.zip": "needs such a model; tests/docs/test_policies.py",
 }
