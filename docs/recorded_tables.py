@@ -146,12 +146,11 @@ def factors_table() -> str:
         first, *others = record["experiment"]["entries"]
         titles = {first["name"]: "as it is"} | {each["name"]: each["title"] for each in others}
         for row in record["results"]:
-            success, collision = (_numbers(row[name]) for name in ("success", "collision"))
-            shares = [_percent(success), f"{100 * min(row['success_each']):.1f}"]
+            shares = [_percent(_numbers(row["success"])), f"{100 * min(row['success_each']):.1f}"]
             than = row["difference"]
             points = _percent(_numbers(than["success"]), "+.1f") if than else ""
             change = [f"`{first['recipe']}`", titles[row["entry"]], points]
-            rows.append([*change, *shares, f"{100 * collision[0]:.1f}"])
+            rows.append([*change, *shares, f"{100 * row['collision']['value']:.1f}"])
     heads = ["recipe", "change", "points (95 %)", "success % (95 %)", "worst seed %", "collision %"]
     return markdown_table(heads, rows)
 
@@ -246,9 +245,8 @@ def skills_table() -> str:
     for problem, (bare, behind) in faced.items():
         shown = []
         for row in (bare, behind):
-            worst = min(share for share, _ in row["seeds"].values())
-            shown += [_percent(row["success"]), f"{100 * worst:.1f}"]
-            shown.append(f"{100 * row['collision']:.2f}")
+            worst = 100 * min(share for share, _ in row["seeds"].values())
+            shown += [_percent(row["success"]), f"{worst:.1f}", f"{100 * row['collision']:.2f}"]
         ratio = "" if behind["step_ratio"] is None else f"{behind['step_ratio']:.2f}"
         alone, oracle = (f"{100 * behind[name]:.1f}" for name in ("control", "oracle"))
         end = [alone, oracle, ratio, f"{behind['speed']:.2f}", f"{behind['minutes']:.1f}"]
