@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from kinarm.errors import MOST_TRIALS, whole_number
 from kinarm.problem import ProblemLike, ReachProblem
-from kinarm.scenarios import draw_for_each
+from kinarm.scenarios import draw_scenarios
 from kinarm.simulator import Simulator
 from kinarm.task import RewardWeights
 
@@ -65,7 +65,7 @@ class TrialSet:
         trials, seed = whole_number("trials", trials, 1, MOST_TRIALS), whole_number("seed", seed, 0)
         lots = (range(first, min(first + LOT, trials)) for first in range(0, trials, LOT))
         drawn = [
-            draw_for_each(simulator.world, [trial_generator(seed, trial) for trial in lot], 1)
+            draw_scenarios(simulator.world, [trial_generator(seed, trial) for trial in lot], 1)
             for lot in lots
         ]
         starts, goals = (np.concatenate(part)[:, 0] for part in zip(*drawn, strict=True))

@@ -53,26 +53,16 @@ def _omitted(item: Field[Any], entry: Any) -> bool:
     return entry is None or ("optional" in item.metadata and bool(entry == default))
 
 
-DEEP_KEY = re.compile(r"""^\s*\[*(?:[\w"'-]+\s*\.\s*){100}""", re.MULTILINE)
-"""A key of a hundred parts, for which the time to read grows with their square."""
-
-
 def read_toml(path: Path, what: str) -> dict[str, Any]:
     """Read a TOML file, called ``what`` in messages."""
     try:
-        return _toml_entries(path.read_bytes().decode())
+        return tomllib.loads(path.read_bytes().decode())
     except OSError as error:
         raise InvalidInputError(f"cannot read {what} {str(path)!r}: {error.strerror}") from error
     except (ValueError, RecursionError) as error:
         article = "an" if what[0] in "aeiou" else "a"
         reason = first_line(error)
         raise InvalidInputError(f"{path}: not {article} {what} file: {reason}") from error
-
-
-def _toml_entries(text: str) -> dict[str, Any]:
-    if DEEP_KEY.search(text):
-        raise ValueError("a key has more than 100 parts")
-    return tomllib.loads(text)
 
 
 def take_base(entries: dict[str, Any], where: str, bases: Collection[str], default: str) -> str:

@@ -16,7 +16,7 @@ failures of a run.
 
 import copyreg
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from importlib import import_module
 from typing import Any
 
@@ -92,6 +92,13 @@ class UnknownNameError(InvalidInputError):
             f"unknown {kind} {given!r}{meant(given, self.available)}; "
             f"available: {', '.join(self.available) or 'none'}"
         )
+
+
+def check_names(kind: str, given: Iterable[str], available: Collection[str]) -> None:
+    """Refuse the first of the given names that is not available with `UnknownNameError`."""
+    for name in given:
+        if name not in available:
+            raise UnknownNameError(kind, name, available)
 
 
 def meant(given: str, available: Iterable[str]) -> str:

@@ -292,13 +292,10 @@ def _check_poses(poses: Array) -> None:
     right = (np.cross(turns[:, :, 0], turns[:, :, 1]) * turns[:, :, 2]).sum(axis=1) > 0
     last = np.abs(poses[:, 3] - [0, 0, 0, 1]).max(axis=1, initial=0.0)
     for target in np.flatnonzero((off > ORTHONORMAL) | ~right | (last > ORTHONORMAL)):
-        if off[target] > ORTHONORMAL:
-            reason = f"its axes are {off[target]:.2g} off unit length or right angles"
-        elif not right[target]:
-            reason = "its axes are left-handed"
-        else:
-            reason = f"its last row is {poses[target, 3].tolist()}, not [0, 0, 0, 1]"
-        raise InvalidInputError(f"target {target} is no pose: {reason}")
+        raise InvalidInputError(
+            f"target {target} is no pose: its axes must be orthonormal and right-handed, and its "
+            f"last row [0, 0, 0, 1], got {poses[target].tolist()}"
+        )
 
 
 def approach_axis(arm: Arm) -> Array:

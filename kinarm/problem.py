@@ -6,7 +6,7 @@ What cannot be used is a `KinarmError` of one line.
 import hashlib
 import json
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from kinarm._fields import OPTIONAL, Checked, from_plain, init_fields, to_plain
 from kinarm._files import absolute, named_file, write_text
 from kinarm.arm_specification import ArmSpecification
-from kinarm.errors import ProblemError, UnknownNameError
+from kinarm.errors import ProblemError, check_names
 from kinarm.observation_choice import PAPER_PARTS, Observation
 from kinarm.plant import Plant
 from kinarm.problem_files import PAPER_TASKS, find_scene, problem_names, read_problem
@@ -74,9 +74,8 @@ class ReachProblem(Checked):
             raise ProblemError("a scene needs at least one goal region")
         if not self.task.goal_regions:
             object.__setattr__(self, "task", replace(self.task, goal_regions=tuple(available)))
+        check_names("goal region in task.goal_regions:", self.task.goal_regions, available)
         for name in self.task.goal_regions:
-            if name not in available:
-                raise UnknownNameError("goal region in task.goal_regions:", name, available)
             obstacle = self.scene.obstacle_around(self.scene.goal_region(name))
             if obstacle is not None:
                 raise ProblemError(f"goal region {name!r} lies inside obstacle {obstacle.name!r}")
@@ -150,12 +149,13 @@ class ReachProblem(Checked):
         for name, what in (("reward", "reward term"), ("goal", "setting of goals")):
             if isinstance(given.get(name), Mapping):
                 of_part, own = dict(given[name]), getattr(task, name)
-                _check_names(what, of_part, type(own))
+                check_names(what, of_part, init_fields(type(own)))
                 given[name] = replace(own, **of_part)
         for part, kind in PARTS.items():
             if own := _taken(given, kind):
                 changes[part] = replace(changes.get(part, getattr(self, part)), **own)
-        _check_names("setting of a problem", given, ReachProblem, *PARTS.values())
+        settings = [name for kind in (ReachProblem, *PARTS.values()) for name in init_fields(kind)]
+        check_names("setting of a problem", given, settings)
         return replace(self, **changes)
 
     def body_offsets(self, taken: NDArray[np.int64]) -> NDArray[np.float64]:
@@ -285,13 +285,6 @@ def _specification(arm: "Arm | ArmSpecification | str | Path") -> ArmSpecificati
 
 def _taken(given: dict[str, Any], kind: type) -> dict[str, Any]:
     return {name: given.pop(name) for name in init_fields(kind) if name in given}
-
-
-def _check_names(what: str, given: Mapping[str, Any], *kinds: type) -> None:
-    available = [item.name for kind in kinds for item in fields(kind)]
-    for name in given:
-        if name not in available:
-            raise UnknownNameError(what, name, available)
 
 
 def _leaves(value: Any, path: str = "") -> Iterator[tuple[str, Any]]:

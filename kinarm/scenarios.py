@@ -17,39 +17,22 @@ PREFETCHED = 32
 """Scenarios drawn at a time for the episodes of an arm."""
 
 
-def draw_scenarios(world: World, rng: np.random.Generator, count: int) -> tuple[Array, Array]:
-    """Draw starts, shape (count, n_joints) [rad or m], and goals, shape (count, goal_width).
-
-    Goals are uniform over the task's regions, with rests as the task says. Each
-    actuated joint starts uniformly within its limits, scaled by the start spread, or the arm starts
-    at one of the task's configurations, without contact and farther from the
-    goal's position than the tolerance. If the task asks for it, goals without a free
-    configuration are drawn again. If none is found in 2000 attempts, that is
-    a `kinarm.ProblemError`. `kinarm.World.free` says what counts as free.
-
-    Parameters
-    ----------
-    world, rng, count
-        World of the problem, source of randomness, and number.
-    """
-    starts, goals = draw_for_each(world, [rng], count)
-    return starts[0], goals[0]
-
-
-def draw_for_each(
+def draw_scenarios(
     world: World, rngs: Sequence[np.random.Generator], count: int
 ) -> tuple[Array, Array]:
-    """Draw starts and goals from several generators, and screen them together.
+    """Draw starts [rad or m] and goals from several generators, and screen them together.
 
-    Generators give the same numbers as in `draw_scenarios`, along a further
-    first axis.
+    Starts have the shape (n_rngs, count, n_joints), and goals (n_rngs, count, goal_width). Goals
+    are uniform over the task's regions, with rests as the task says. Each actuated joint starts
+    uniformly within its limits, scaled by the start spread, or the arm starts at one of the task's
+    configurations, without contact and farther from the goal's position than the tolerance. If the
+    task asks for it, goals without a free configuration are drawn again. If none is found in 2000
+    attempts, that is a `kinarm.ProblemError`. `kinarm.World.free` says what counts as free.
 
     Parameters
     ----------
-    world, count
-        As for `draw_scenarios`.
-    rngs : sequence of numpy.random.Generator
-        Sources of randomness.
+    world, rngs, count
+        World of the problem, sources of randomness, and number from each.
     """
     whole_number("count", count, 0)
     arm, task, n_actions = world.arm, world.problem.task, world.n_actions
@@ -189,6 +172,6 @@ class ScenarioQueues:
         rows = (self._drawn - self._taken <= PREFETCHED).nonzero()[0]
         rngs = [self._rngs[row] for row in rows.tolist()]
         places = (self._drawn[rows, None] + np.arange(PREFETCHED)) % (2 * PREFETCHED)
-        drawn = draw_for_each(self._world, rngs, PREFETCHED)
+        drawn = draw_scenarios(self._world, rngs, PREFETCHED)
         self._starts[rows[:, None], places], self._goals[rows[:, None], places] = drawn
         self._drawn[rows] += PREFETCHED

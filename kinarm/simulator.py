@@ -186,7 +186,8 @@ class Simulator(EpisodeRunner):
         tuple of ndarray, shape (count, n_joints) and (count, goal_width)
             Starts [rad or m] and goals [m].
         """
-        return draw_scenarios(self.world, rng, count)
+        starts, goals = draw_scenarios(self.world, [rng], count)
+        return starts[0], goals[0]
 
     def reset(
         self,

@@ -10,7 +10,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from kinarm._command_line import add_options, given_options, run_command
-from kinarm._fields import Checked
 from kinarm._files import shipped_files
 from kinarm._parser import Parser
 from kinarm.errors import FROM_ZERO, InvalidInputError
@@ -47,7 +46,7 @@ def seeds_of(text: str) -> tuple[int, ...]:
 
 @dataclass(frozen=True, kw_only=True)
 class TrainRequest(ProblemOptions):
-    """A training, from its settings to the files that it leaves.
+    """A training, or one with each of several seeds, from settings to the files that it leaves.
 
     Parameters
     ----------
@@ -57,6 +56,11 @@ class TrainRequest(ProblemOptions):
         Name of settings, or a TOML file with some.
     seed : int, optional
         Seed of all randomness.
+    seeds : tuple of int
+        Train several seeds in parallel: a number (5 is 0 to 4) or a range
+        (5-9). One policy for each goes into the folder --out.
+    jobs : int, optional
+        Seeds at a time.
     settings : mapping
         Settings of the learner that replace those of the recipe.
     out : Path
@@ -69,12 +73,16 @@ class TrainRequest(ProblemOptions):
     learner: str
     recipe: str | None = field(default=None, metadata={"metavar": "NAME_OR_FILE"})
     seed: int | None = field(default=None, metadata=FROM_ZERO)
+    seeds: tuple[int, ...] = field(
+        default=(), metadata={"parse": seeds_of, "metavar": "N", **FROM_ZERO}
+    )
+    jobs: int | None = None
     settings: dict[str, Any] = field(default_factory=dict)
     out: Path | str = field(metadata={"metavar": "FILE.npz"})
     overwrite: bool = False
 
     GROUPS: ClassVar = {
-        "training": "recipe seed",
+        "training": "recipe seed seeds jobs",
         "output": "out overwrite",
         **ProblemOptions.GROUPS,
     }
@@ -82,73 +90,30 @@ class TrainRequest(ProblemOptions):
         **ProblemOptions.DEFAULTS,
         "recipe": "the first one",
         "seed": "0",
+        "seeds": "one training",
+        "jobs": "one a processor",
         "problem": "the recipe's: right",
     }
 
-    def run(self) -> "Trained":
-        """Train, and write the policy and its learning curve.
-
-        The state is kept every few seconds in a folder beside the policy, such as
-        ``right.training``, until the training is finished: after an interruption,
-        the same request goes on from there.
-        """
-        from kinarm.evaluation.experiments.training import train_all
-
-        config, out = self.config(), Path(self.out)
-        outs, folder = {config.seed: out}, out.with_suffix(TRAININGS)
-        (trained,) = train_all(config, outs, folder, overwrite=self.overwrite, keep=False)
-        return trained
-
-    def config(self) -> TrainingConfig:
-        """Settings of the training: the recipe's, with replacements."""
-        problem = self.resolve(default=recipe(self.learner, self.recipe).problem)
-        config: TrainingConfig = recipe(
-            self.learner, self.recipe, problem=problem, seed=self.seed, **self.settings
-        )
-        return config
-
-
-@dataclass(frozen=True, kw_only=True)
-class SeedsRequest(Checked):
-    """Train a policy with each of several seeds, as many at a time as there are processors.
-
-    Each policy equals that of a training with this seed alone, bit for bit.
-
-    Parameters
-    ----------
-    training : TrainRequest
-        What is trained; ``out`` is the folder of the policies, and there is no
-        ``seed``.
-    seeds : tuple of int
-        Train several seeds in parallel: a number (5 is 0 to 4) or a range
-        (5-9). One policy for each goes into the folder --out.
-    jobs : int, optional
-        Seeds at a time.
-    """
-
-    training: TrainRequest
-    seeds: tuple[int, ...] = field(metadata={"parse": seeds_of, "metavar": "N", **FROM_ZERO})
-    jobs: int | None = None
-
-    GROUPS: ClassVar = {"training": "seeds jobs"}
-    DEFAULTS: ClassVar = {"seeds": "one training", "jobs": "one a processor"}
-
     def __post_init__(self) -> None:
         super().__post_init__()
-        if self.training.seed is not None:
+        if self.jobs is not None and not self.seeds:
+            raise InvalidInputError("--jobs goes with --seeds")
+        if self.seed is not None and self.seeds:
             raise InvalidInputError("--seed and --seeds exclude each other")
-        if not self.seeds:
-            raise InvalidInputError("there is no seed to train")
-        if Path(self.training.out).suffix == ".npz":
-            folder = Path(self.training.out).with_suffix("")
+        if self.seeds and Path(self.out).suffix == ".npz":
+            folder = Path(self.out).with_suffix("")
             raise InvalidInputError(f"with --seeds, --out is a folder: --out {folder}")
 
     def run(self) -> "tuple[Trained, ...]":
         """Train, and write a policy and a learning curve for each seed.
 
-        Files are named as ``ars-tuned-both-seed0.npz``. The same request again
-        leaves finished seeds as they are, and the others go on or begin: the
-        folder ``.training`` says how far all are.
+        The state of a single training is kept every few seconds in a folder beside the policy,
+        such as ``right.training``, until it is finished: after an interruption, the same request
+        goes on from there. Files of several seeds, of which each policy equals that of a training
+        with this seed alone, bit for bit, are named as ``ars-tuned-both-seed0.npz``. The same
+        request again leaves finished seeds as they are, and the others go on or begin: the folder
+        ``.training`` says how far all are.
 
         Raises
         ------
@@ -162,11 +127,22 @@ class SeedsRequest(Checked):
         """
         from kinarm.evaluation.experiments.training import shared_name, train_all
 
-        config, folder = self.training.config(), Path(self.training.out)
-        name = shared_name(config)
-        outs = {seed: folder / f"{name}-seed{seed}.npz" for seed in self.seeds}
-        overwrite, place = self.training.overwrite, folder / TRAININGS / name
-        return train_all(config, outs, place, jobs=self.jobs, overwrite=overwrite)
+        config, out = self.config(), Path(self.out)
+        outs, folder = {config.seed: out}, out.with_suffix(TRAININGS)
+        if self.seeds:
+            name = shared_name(config)
+            outs = {seed: out / f"{name}-seed{seed}.npz" for seed in self.seeds}
+            folder = out / TRAININGS / name
+        keep, jobs = bool(self.seeds), self.jobs
+        return train_all(config, outs, folder, jobs=jobs, overwrite=self.overwrite, keep=keep)
+
+    def config(self) -> TrainingConfig:
+        """Settings of the training: the recipe's, with replacements."""
+        problem = self.resolve(default=recipe(self.learner, self.recipe).problem)
+        config: TrainingConfig = recipe(
+            self.learner, self.recipe, problem=problem, seed=self.seed, **self.settings
+        )
+        return config
 
 
 def build_parser(named: str | None = None) -> Parser:
@@ -191,7 +167,6 @@ def _add_learner(
     )
     recipes = {"recipe": tuple(learner.recipes)}
     add_options(parser, TrainRequest, skip=("learner", "settings"), names=recipes)
-    add_options(parser, SeedsRequest, skip=("training",))
     title = f"settings of the learner (defaults of the recipe {learner.first_recipe})"
     add_options(parser.add_argument_group(title), learner.config, skip=CIRCUMSTANCES, explicit=True)
 
@@ -221,11 +196,7 @@ def _train(options: argparse.Namespace) -> None:
     given = given_options(options, find_learner(options.learner).config)
     settings = {name: value for name, value in given.items() if name not in CIRCUMSTANCES}
     request = TrainRequest(**given_options(options, TrainRequest), settings=settings)
-    several = given_options(options, SeedsRequest)
-    if "jobs" in several and "seeds" not in several:
-        raise InvalidInputError("--jobs goes with --seeds")
-    all_of_them = SeedsRequest(training=request, **several).run() if several else (request.run(),)
-    for seed, out, curve in all_of_them:
+    for seed, out, curve in request.run():
         said = "finished earlier"
         if curve:
             last = curve[-1]
@@ -234,5 +205,5 @@ def _train(options: argparse.Namespace) -> None:
                 f"return {last.mean_return:+.3f}, success {100 * last.success:.0f} %"
             )
         sys.stdout.write(f"seed {seed}: {said}; written: {out}\n")
-    name = shlex.quote(f"{request.out}/" if several else str(request.out))
+    name = shlex.quote(f"{request.out}/" if request.seeds else str(request.out))
     sys.stdout.write(f"next: kinarm-eval {name}, kinarm-replay {name}\n")

@@ -13,7 +13,7 @@ from kinarm._tables import csv_text
 from kinarm.evaluation.experiments import table
 from kinarm.evaluation.experiments.table import Group, shown
 from kinarm.evaluation.figures import Band, panels_figure, save_figure
-from kinarm.evaluation.report.templating import markdown_table, template
+from kinarm.evaluation.report.templating import template
 from kinarm.policies.provenance import package_versions, source_commit
 
 if TYPE_CHECKING:
@@ -83,19 +83,11 @@ def _page(name: str, study: "Study", document: dict[str, Any], curves: str) -> s
         document,
         study=study,
         experiment=experiment,
-        trials=experiment.trials,
         best=best.items(),
-        headings=[column.heading for column in table.COLUMNS],
-        rows=[table.group_row(group) for group in groups],
-        rows_in_order=[table.group_row(group) for group in study.groups()],
+        columns=table.COLUMNS,
+        groups=groups,
         curves=curves[curves.index("<svg") :] if curves else "",
-        failures=[(run.name, error) for run, error in study.failures.items()],
-        sources=[
-            (each.title or each.name, each.source) for each in experiment.entries if each.source
-        ],
         text=tomli_w.dumps(experiment.to_json()),
-        meanings=[(each.heading, each.meaning) for each in table.COLUMNS if each.meaning],
-        markdown_table=markdown_table,
     )
 
 

@@ -193,11 +193,6 @@ COLUMNS: tuple[Column[Group], ...] = (
 """Minutes are processor time without the trials of the policies."""
 
 
-def group_row(group: Group) -> tuple[str, ...]:
-    """The row of a group."""
-    return tuple(str(column.cell(group)) for column in COLUMNS)
-
-
 def group_entries(group: Group) -> dict[str, Any]:
     """A group as JSON holds it; intervals are over seeds and trials."""
     touched = np.array([run.outcomes.collision for run in group.runs])

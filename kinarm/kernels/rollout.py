@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kinarm.episodes import COLLISION, PAUSED, RUNNING, SUCCESS, TRUNCATED, Episodes, Rules
-from kinarm.kernels.arriving import arrive, measure, put_goal
 from kinarm.kernels.block_proof import doubtful_steps
 from kinarm.kernels.compiling import Array, call_stage, inlined, lean_kernel
+from kinarm.kernels.goals import arrive, measure, put_goal
 from kinarm.kernels.kinematics import forward_kinematics
 from kinarm.kernels.lane_copies import copy_rows, move_bodies, put, put_scene, take, take_rows
 from kinarm.kernels.lanes import LANES, any_lane, as_numbers, lane_bits, select

@@ -20,7 +20,7 @@ from kinarm.kernels.compiling import Array
 from kinarm.problem import ReachProblem
 from kinarm.scene import Scene
 from kinarm.viewer.camera import stage_scale
-from kinarm.viewer.meshes import Mesh, capsule, cylinder, tube
+from kinarm.viewer.meshes import Mesh, capsule, cylinder
 from kinarm.viewer.parts import (
     CUBE,
     FLASH_RADIUS,
@@ -28,8 +28,6 @@ from kinarm.viewer.parts import (
     OUTCOME_COLOURS,
     SUN,
     SUN_PLACE,
-    TRACE_RADIUS,
-    TRACE_SIDES,
     TRACES,
     Finish,
     cube_mesh,
@@ -37,6 +35,7 @@ from kinarm.viewer.parts import (
     goal_pose,
     grid_lines,
     obstacle_meshes,
+    trace_mesh,
 )
 from kinarm.viewer.visual_shapes import grouped_parts
 
@@ -203,26 +202,6 @@ def draw_arm(window: Visualizer, arm: Arm) -> list[Visualizer]:
     return frames
 
 
-def draw_trace(
-    window: Visualizer, points: NDArray[np.float64], outcome: str | None, scale: float
-) -> None:
-    """Draw the way of the tool; none for a point.
-
-    Parameters
-    ----------
-    window : meshcat.Visualizer
-        Where to draw.
-    points : ndarray, shape (n, 3)
-        Positions of the tool [m].
-    outcome : str, optional
-        How the episode ended, if it has.
-    scale : float
-        Size of the stage; see `stage_scale`.
-    """
-    if len(points) > 1:
-        put(window, TRACES[outcome], tube(points, scale * TRACE_RADIUS, TRACE_SIDES))
-
-
 class LiveStage:
     """Surroundings, goal, arm and its tool's way; Meshcat's server shows them at an ``address``."""
 
@@ -271,7 +250,8 @@ class LiveStage:
 
     def draw_trace(self, points: ArrayLike, outcome: str | None) -> None:
         """Show the tool's way, shape (n, 3) [m], in an outcome's colour."""
-        draw_trace(self._window["trace"], np.asarray(points), outcome, self._scale)
+        if len(way := np.asarray(points)) > 1:
+            put(self._window["trace"], TRACES[outcome], trace_mesh(way, self._scale))
 
     def pace(self, seconds: float) -> None:
         """Wait until a time has passed since the last call ended [s]."""

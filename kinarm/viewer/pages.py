@@ -17,9 +17,9 @@ from kinarm.errors import InvalidInputError
 from kinarm.recording import Recording
 from kinarm.scene import Scene
 from kinarm.viewer.camera import stage_scale
-from kinarm.viewer.drawing import DrawnScene, draw_random_bodies, draw_stage, draw_trace
+from kinarm.viewer.drawing import DrawnScene, draw_random_bodies, draw_stage, put
 from kinarm.viewer.html_page import HtmlPage, page_html
-from kinarm.viewer.parts import PAGE_COLOURS, TRACE_SIDES, goal_pose
+from kinarm.viewer.parts import PAGE_COLOURS, TRACE_SIDES, TRACES, goal_pose, trace_mesh
 from kinarm.viewer.visual_shapes import arm_parts, link_joints
 
 RUN_FIELDS = ("policy", "outcome", "contact", "replaced", "refused", "states", "distances")
@@ -119,7 +119,8 @@ def replay_page(
         for name, run in zip(("run", "ghost"), runs, strict=False):
             points = np.array([arm.tool_position(state) for state in run.states])
             way = drawn.window[f"trials/{number}/{name}"]
-            draw_trace(way, points, run.outcome, stage_scale(arm, scene))
+            if run.steps:
+                put(way, TRACES[run.outcome], trace_mesh(points, stage_scale(arm, scene)))
     data = {
         **arm_data(arm, scene),
         "traceIndices": 6 * TRACE_SIDES,

@@ -179,6 +179,11 @@ def goal_pose(goal: GoalSpecification, row: ArrayLike) -> Array:
     return pose
 
 
+def trace_mesh(points: Array, scale: float) -> Mesh:
+    """The way of the tool through points, shape (n, 3) [m], on a stage of a scale."""
+    return tube(points, scale * TRACE_RADIUS, TRACE_SIDES)
+
+
 def cube_mesh(scene: Scene) -> Mesh:
     """The cube that marks a goal, about the origin."""
     edge = scene.cube_edge or 0.01

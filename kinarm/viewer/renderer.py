@@ -21,7 +21,7 @@ from kinarm.problem import ProblemLike, ReachProblem
 from kinarm.recording import OUTCOMES
 from kinarm.viewer.camera import Camera, stage_scale
 from kinarm.viewer.canvas import NEAR, Layer, draw
-from kinarm.viewer.meshes import Mesh, capsule, lathe, tube
+from kinarm.viewer.meshes import Mesh, capsule, lathe
 from kinarm.viewer.parts import (
     CUBE,
     FLASH_RADIUS,
@@ -29,8 +29,6 @@ from kinarm.viewer.parts import (
     OUTCOME_COLOURS,
     SUN,
     SUN_PLACE,
-    TRACE_RADIUS,
-    TRACE_SIDES,
     TRACES,
     Finish,
     channels,
@@ -41,6 +39,7 @@ from kinarm.viewer.parts import (
     obstacle_meshes,
     to_linear,
     to_srgb,
+    trace_mesh,
 )
 from kinarm.viewer.visual_shapes import grouped_parts, link_joints
 
@@ -185,8 +184,7 @@ class Renderer:
             raise UnknownNameError("outcome", outcome, OUTCOMES)
         surfaces = list(self._surfaces)
         if len(way) > 1:
-            mesh = tube(way, self._scale * TRACE_RADIUS, TRACE_SIDES)
-            surfaces.append((0, TRACES[outcome], _single([mesh])))
+            surfaces.append((0, TRACES[outcome], _single([trace_mesh(way, self._scale)])))
         poses = single(self._poses(configuration, goal, time))
         drawn = self._drawn(surfaces, poses, outcome, contact)
         layers = [drawn, _ball(goal[:3], self.problem.task.tolerance, HALO)]

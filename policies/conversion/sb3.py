@@ -206,13 +206,6 @@ def _check_actions(space: Any, simulator: Simulator) -> None:
 def _check_observations(space: Any, interface: Interface, simulator: Simulator) -> None:
     """Refuse observations that are not the arm's."""
     own: Any = interface.observation_space
-    if isinstance(space, Box) and isinstance(own, Box):
-        frames, rest = divmod(int(np.prod(space.shape)), own.shape[0])
-        if frames > 1 and not rest:
-            raise InvalidInputError(
-                f"the model sees {frames} observations at once (a frame stack): kinarm's policies "
-                "see one"
-            )
     goals = simulator.world.layout.entries(of_goal=True)
     of_goal = {WHOLE: goals, "desired_goal": np.arange(3)}
     theirs, ours = _parts(space), _parts(own)

@@ -9,15 +9,11 @@ from kinarm.errors import InvalidInputError
 from kinarm.kernels.compiling import Array
 from kinarm.policies.running.backend import Backend
 
-STEPS = 4095
-"""Steps of a servo in a turn, as LeRobot counts them."""
-
 
 class SOArm(Backend):
     """A follower arm SO-101 of LeRobot; the gripper is left alone.
 
-    LeRobot has joints in degrees from the middle of the calibrated range, or
-    normalised to -100 to 100 over it.
+    LeRobot has joints in degrees from the middle of the calibrated range.
 
     Parameters
     ----------
@@ -25,8 +21,6 @@ class SOArm(Backend):
         Its serial port.
     name : str
         Name of its calibration, LeRobot's ``id``.
-    degrees : bool
-        Whether LeRobot is to use degrees.
     """
 
     joint_names: tuple[str, ...] = (
@@ -37,7 +31,7 @@ class SOArm(Backend):
         "wrist_roll",
     )
 
-    def __init__(self, address: str, name: str = "kinarm", *, degrees: bool = True) -> None:
+    def __init__(self, address: str, name: str = "kinarm") -> None:
         try:
             library = import_module("lerobot.robots.so_follower")
         except ImportError as error:
@@ -45,32 +39,25 @@ class SOArm(Backend):
                 "lerobot is not installed: pip install 'lerobot[feetech]>=0.6'"
             ) from error
         config = library.SO101FollowerConfig(
-            port=address, id=name, use_degrees=degrees, disable_torque_on_disconnect=False
+            port=address, id=name, use_degrees=True, disable_torque_on_disconnect=False
         )
         self._robot: Any = library.SO101Follower(config)
-        self._unit = np.full(len(self.joint_names), np.deg2rad(1.0))
-        self._name, self._degrees = name, degrees
+        self._name = name
 
     def connect(self, period: float) -> None:  # noqa: ARG002
         """Connect to the bus; the arm must be calibrated, and is held where it is."""
         self._robot.connect(calibrate=False)
         if not self._robot.is_calibrated:
             raise ConnectionError(f"run lerobot-calibrate with --robot.id={self._name}")
-        if not self._degrees:
-            for joint, name in enumerate(self.joint_names):
-                known = self._robot.calibration[name]
-                turn = 2.0 * np.pi * (known.range_max - known.range_min) / STEPS / 200.0
-                self._unit[joint] = -turn if known.drive_mode else turn
 
     def read(self) -> Array:
         """Present positions of the servos."""
         seen = self._robot.get_observation()
-        positions = np.array([seen[f"{name}.pos"] for name in self.joint_names], dtype=float)
-        return np.asarray(positions * self._unit)
+        return np.deg2rad([seen[f"{name}.pos"] for name in self.joint_names])
 
     def command(self, positions: Array) -> None:
         """Set the servos' goals."""
-        goals = (positions / self._unit).tolist()
+        goals = np.rad2deg(positions).tolist()
         named = zip(self.joint_names, goals, strict=True)
         self._robot.send_action({f"{name}.pos": goal for name, goal in named})
 

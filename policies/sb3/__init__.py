@@ -4,7 +4,7 @@ import tomllib
 from dataclasses import dataclass, field
 from typing import Any
 
-from kinarm.errors import NOT_NEGATIVE, POSITIVE, InvalidInputError, UnknownNameError
+from kinarm.errors import NOT_NEGATIVE, POSITIVE, InvalidInputError, check_names
 from kinarm.policies.config import MANY, Schedule, TrainingConfig
 from kinarm.policies.learners import Learner, TrainingState, imported
 from kinarm.policies.recipes import shipped_learner
@@ -77,8 +77,7 @@ class SB3Config(TrainingConfig):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if self.algorithm not in ALGORITHMS:
-            raise UnknownNameError("algorithm", self.algorithm, ALGORITHMS)
+        check_names("algorithm", [self.algorithm], ALGORITHMS)
         if self.learning_rate_schedule == "linear" and "learning_rate" not in self.hyperparameters:
             raise InvalidInputError(
                 "learning_rate_schedule linear needs hyperparameters.learning_rate to start from"

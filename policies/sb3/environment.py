@@ -23,12 +23,7 @@ def sb3_vec_env(
     seed: int | None = None,
     observation_dtype: DTypeLike = "float32",
     goal_conditioned: bool = False,
-    threads: int | None = None,
-    render_mode: str | None = None,
-    width: int = 480,
-    height: int = 360,
-    camera: Any = None,
-    **overrides: Any,
+    **settings: Any,
 ) -> "SB3VecEnv":
     """Make a batch of arms as the ``env`` of a learner of Stable-Baselines3.
 
@@ -46,12 +41,9 @@ def sb3_vec_env(
         As for `kinarm.ReachEnv`.
     goal_conditioned : bool
         Whether arms are those of `kinarm.ReachGoalEnv`, in any problem.
-    threads : int, optional
-        As for `kinarm.Simulator`.
-    render_mode, width, height, camera
-        As for `kinarm.ReachEnv`.
-    **overrides
-        As for `kinarm.ReachProblem.replace`: ``horizon``, ``reward`` ...
+    **settings
+        As for `kinarm.ReachVectorEnv`: ``threads``, ``render_mode``, ``width``, ``height``,
+        ``camera``, and settings of the problem such as ``horizon`` and ``reward``.
 
     Raises
     ------
@@ -62,15 +54,7 @@ def sb3_vec_env(
     from kinarm.policies.sb3.vec_env import SB3VecEnv
 
     whole_number("n_envs", n_envs, 1)
-    settings = {
-        "observation_dtype": observation_dtype,
-        "threads": threads,
-        "render_mode": render_mode,
-        "width": width,
-        "height": height,
-        "camera": camera,
-        **overrides,
-    }
+    settings["observation_dtype"] = observation_dtype
     env = SB3VecEnv(_batch(problem, n_envs, goal_conditioned, settings))
     env.seed(None if seed is None else whole_number("seed", seed, 0))
     return env

@@ -9,12 +9,12 @@ from kinarm.evaluation.commands.bench import BenchmarkRequest
 from kinarm.evaluation.commands.replay import ReplayRequest
 from kinarm.evaluation.commands.reproduce import ReproductionRequest
 from kinarm.evaluation.commands.study import StudyRequest
-from kinarm.evaluation.commands.train import SeedsRequest, TrainRequest
+from kinarm.evaluation.commands.train import TrainRequest
 from kinarm.problem import PROBLEMS
 
 LONG = (
     *(BenchmarkRequest, EvaluationRequest, ReplayRequest, ReproductionRequest),
-    *(SeedsRequest, StudyRequest, TrainRequest),
+    *(StudyRequest, TrainRequest),
 )
 """What takes long to run: it is enough that it could begin."""
 

@@ -183,7 +183,7 @@ def test_what_fails_or_ends_before_a_checkpoint_leaves_nothing(run, tmp_path, mo
 
 def test_a_request_gives_policy_and_curve(tmp_path):
     out = tmp_path / "p.npz"
-    trained = TrainRequest(learner="ars", settings={"iterations": 2}, out=out).run()
+    (trained,) = TrainRequest(learner="ars", settings={"iterations": 2}, out=out).run()
     expected = train_policy(recipe("ars", "paper", iterations=2))
     assert (trained.seed, trained.out) == (0, out)
     assert [point.mean_return for point in trained.curve] == [

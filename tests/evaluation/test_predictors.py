@@ -215,7 +215,7 @@ class TestWrapper:
         assert ends_of(evaluation) == expected
         assert evaluation.contestant.note == "PPO: in wrapper stacked"
         model.save(tmp_path / "model.zip")
-        with pytest.raises(InvalidInputError, match="frame stack"):
+        with pytest.raises(InvalidInputError, match="in a wrapper that changes observations"):
             find_contestants(tmp_path / "model.zip", "right")
         (found,) = find_contestants(tmp_path / "model.zip", "right", wrapper=stacked)
         assert ends_of(evaluate(found, "right", TRIALS, SEED)) == expected

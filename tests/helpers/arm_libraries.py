@@ -2,8 +2,6 @@
 
 from types import SimpleNamespace
 
-import numpy as np
-
 
 class FakeRTDE:
     """Both interfaces of ``ur_rtde`` 1.6 to one arm, which obeys at once."""
@@ -53,14 +51,12 @@ class FakeSO101:
     names = ("shoulder_pan", "shoulder_lift", "elbow_flex", "wrist_flex", "wrist_roll")
 
     def __init__(self, config):
+        assert config.use_degrees
         self.config, self.is_connected, self.is_calibrated = config, False, True
         self.steps = {
             name: 0.5 * sum(held) for name, held in zip(self.names, self.ranges, strict=True)
         }
-        self.calibration = {
-            name: SimpleNamespace(drive_mode=0, range_min=low, range_max=high)
-            for name, (low, high) in zip(self.names, self.ranges, strict=True)
-        }
+        self.middles = dict(self.steps)
 
     def connect(self, calibrate=True):
         assert not calibrate
@@ -73,27 +69,18 @@ class FakeSO101:
     def get_observation(self):
         if not self.is_connected:
             raise ConnectionError("SO101Follower is not connected")
-        units = {f"{name}.pos": self.unit(name, step) for name, step in self.steps.items()}
-        return {**units, "gripper.pos": 12.0}
+        degrees = {
+            f"{name}.pos": (step - self.middles[name]) * 360 / 4095
+            for name, step in self.steps.items()
+        }
+        return {**degrees, "gripper.pos": 12.0}
 
     def send_action(self, action):
         assert set(action) == {f"{name}.pos" for name in self.names}
         for key, value in action.items():
             name = key.removesuffix(".pos")
-            known = self.calibration[name]
-            if self.config.use_degrees:
-                middle = 0.5 * (known.range_min + known.range_max)
-                self.steps[name] = value * 4095 / 360 + middle
-            else:
-                share = (np.clip(value, -100, 100) + 100) / 200
-                self.steps[name] = share * (known.range_max - known.range_min) + known.range_min
+            self.steps[name] = value * 4095 / 360 + self.middles[name]
         return action
-
-    def unit(self, name, step):
-        known = self.calibration[name]
-        if self.config.use_degrees:
-            return (step - 0.5 * (known.range_min + known.range_max)) * 360 / 4095
-        return (step - known.range_min) / (known.range_max - known.range_min) * 200 - 100
 
 
 def fake_lerobot():

@@ -101,7 +101,6 @@ class TestFile:
             ("[task]\nhorizons = 3", "unknown key 'task.horizons' .did you mean 'horizon'"),
             ('[task]\ntolerance = "5 cm"', r"task.tolerance must be a number \[m\], got '5 cm'"),
             ("[task.reward]\ncollision = 1", "task.reward: .*collision = 1 rewards contact"),
-            ("a" + 100 * ".a", "not a problem file: a key has more than 100 parts"),
             (
                 '[[scene.obstacles]]\nname = "post"\nlower = [0, 0, 0]',
                 r"'scene.obstacles\[0\].upper' is missing: Opposite corners",

@@ -102,10 +102,9 @@ class TestSO101:
     def library(self, monkeypatch):
         monkeypatch.setitem(sys.modules, "lerobot.robots.so_follower", fake_lerobot())
 
-    @pytest.mark.parametrize("degrees", [True, False])
-    def test_units(self, degrees):
+    def test_units(self):
         """A position in radians is the same share of a turn of the encoder."""
-        arm = SOArm("/dev/ttyACM0", degrees=degrees)
+        arm = SOArm("/dev/ttyACM0")
         arm.connect(0.02)
         middles = [0.5 * sum(ends) for ends in FakeSO101.ranges]
         np.testing.assert_allclose(arm.read(), np.zeros(5), atol=1e-12)
