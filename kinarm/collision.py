@@ -15,15 +15,16 @@ from numpy.typing import NDArray
 
 from kinarm.arm import Arm
 from kinarm.contact_pairs import (
+    NEVER_TOUCH,
     body_names,
     candidate_pairs,
     make_verdicts_reliable,
+    never_touching,
     start_anew,
     uninformative_pairs,
 )
 from kinarm.contact_shapes import ContactShapes
 from kinarm.meshes import coal_shape
-from kinarm.never_touching import NEVER_TOUCH, never_touching
 from kinarm.scene import Scene
 
 

@@ -111,10 +111,12 @@ class Networks:
         (n_observations, *_), n_actions = layers[0].weights.shape[2:], width
         if not -1 <= self.rates <= n_observations - n_actions:
             raise InvalidInputError(f"rates must be the first of {n_actions} observations")
-        if self.mirror is not None:
-            finite_array("mirror of observations", self.mirror.observations, (n_observations,))
-            finite_array("mirror of actions", self.mirror.actions, (n_actions,))
-            whole_number("side of the mirror", self.mirror.side, 0, n_observations - 1)
+        if (mirror := self.mirror) is not None:
+            seen = finite_array("mirror of observations", mirror.observations, (n_observations,))
+            actions = finite_array("mirror of actions", mirror.actions, (n_actions,))
+            whole_number("side of the mirror", mirror.side, 0, n_observations - 1)
+            mirror = mirror._replace(observations=seen, actions=actions)
+            object.__setattr__(self, "mirror", mirror)
         object.__setattr__(self, "layers", tuple(layers))
         object.__setattr__(self, "activations", activations)
 

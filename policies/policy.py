@@ -14,7 +14,7 @@ from kinarm._fields import from_plain, to_plain
 from kinarm._files import Archive, load_archive, reading, save_archive, write_atomically
 from kinarm.arm import Arm
 from kinarm.errors import InvalidInputError, PolicyFileError, finite_array
-from kinarm.networks import Activation, Mirror, Networks, checked_activations
+from kinarm.networks import Activation, Mirror, Networks
 from kinarm.networks import Layer as Layer
 from kinarm.observation_choice import Observation
 from kinarm.observation_layout import ObservationLayout, observation_layout
@@ -69,33 +69,21 @@ class Policy:
     residual: bool = False
 
     def __post_init__(self) -> None:
-        if not self.layers:
-            raise InvalidInputError("a policy needs at least one layer")
-        activations = checked_activations(self.activations, len(self.layers))
-        mean = finite_array("mean", self.mean, (None,))
+        of_one: list[Any] = [([weights], [bias]) for weights, bias in self.layers]
+        networks = Networks(tuple(of_one), self.activations, self.mirror)
+        mean = finite_array("mean", self.mean, networks.widths[:1])
         std = finite_array("std", self.std, mean.shape)
         if self.residual and "resolved_rate" not in self.layout.places:
             raise InvalidInputError("a residual policy needs to see 'resolved_rate'")
         if (std < 0).any():
             raise InvalidInputError("std must not be negative")
-        layers, width = [], len(mean)
-        for number, layer in enumerate(self.layers):
-            weights = finite_array(f"weights of layer {number}", layer.weights, (None, width))
-            width = len(weights)
-            bias = finite_array(f"bias of layer {number}", layer.bias, (width,))
-            layers.append(Layer(weights, bias))
-        if (mirror := self.mirror) is not None:
-            mirror = Mirror(
-                finite_array("mirror of observations", mirror.observations, mean.shape),
-                finite_array("mirror of actions", mirror.actions, (width,)),
-                mirror.side,
-            )
-        for array in (mean, std, *chain(*layers), *(mirror or ())[:2]):
+        layers = tuple(Layer(weights[0], bias[0]) for weights, bias in networks.layers)
+        for array in (mean, std, *chain(*layers), *(networks.mirror or ())[:2]):
             if np.abs(array).max(initial=0.0) > LARGEST:
                 raise InvalidInputError(f"statistics and weights must be at most {LARGEST:g}")
             array.flags.writeable = False
-        checked = {"mean": mean, "std": std, "layers": tuple(layers), "mirror": mirror}
-        for name, part in {**checked, "activations": activations}.items():
+        checked = {"activations": networks.activations, "mirror": networks.mirror}
+        for name, part in {"mean": mean, "std": std, "layers": layers, **checked}.items():
             object.__setattr__(self, name, part)
 
     def __repr__(self) -> str:

@@ -20,7 +20,7 @@ from kinarm.evaluation import METRICS, Study
 from kinarm.evaluation.report.templating import markdown_table
 from kinarm.evaluation.statistics import share_over_seeds
 from kinarm.policies import Policy
-from kinarm.ways import solved_by_ways
+from kinarm.scenarios import solved_by_ways
 
 BASE = Mount(position=(0.0, 0.0, 0.9144), rpy=(0.0, 0.0, 1.57))
 """Where the arm stands in the scenes, by the URDF that they come with."""

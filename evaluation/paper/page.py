@@ -88,18 +88,10 @@ def claims_document(
     results: PaperResults, claims: Claims, command: str, commits: list[str]
 ) -> dict[str, Any]:
     """All verdicts and their evidence, as ``claims.json`` holds them."""
-    trials = to_plain(results.experiment.trials)
-    curve = trials["curve"]
     return {
         "study": "full" if results.is_judged else "quick",
         "command": command,
-        "protocol": {
-            "trials": trials["count"],
-            "seed": trials["seed"],
-            "snapshots": curve["points"],
-            "snapshot_trials": curve["count"],
-            "snapshot_seed": curve["seed"],
-        },
+        "protocol": to_plain(results.experiment.trials),
         "trainings": len(results.runs),
         "environment_steps": sum(run.environment_steps for run in results.runs),
         "commits": commits,

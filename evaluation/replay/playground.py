@@ -11,7 +11,7 @@ from kinarm.policies.export import contract_of
 from kinarm.policies.policy import Policy
 from kinarm.problem_options import say_choices
 from kinarm.viewer.html_page import HtmlPage
-from kinarm.viewer.playground import play_page
+from kinarm.viewer.pages import play_page
 from kinarm.world import World
 
 if TYPE_CHECKING:

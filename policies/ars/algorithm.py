@@ -15,7 +15,6 @@ from kinarm.kernels.compiling import Array
 from kinarm.networks import Layer, Networks, split_parameters
 from kinarm.policies.ars import ARSConfig, ARSState
 from kinarm.policies.ars.networks import (
-    first_deviations,
     initial_network,
     parameters_of,
     perturbations,
@@ -57,8 +56,7 @@ class ARSTraining:
                     "initial_policy normalises observations: without normalize it is another one"
                 )
         elif self.config.net_arch:
-            deviations = first_deviations(self.simulator.world.layout)
-            theta = initial_network(rng, deviations, self._widths[1:])
+            theta = initial_network(rng, self.simulator.world.layout, self._widths[1:])
         else:
             theta = np.zeros((n_actions, n_observations))
         return ARSState(

@@ -34,25 +34,20 @@ def perturbations(rng: np.random.Generator, shape: tuple[int, ...]) -> Array:
     return numbers[:, :half].reshape(-1)[:count].reshape(shape)
 
 
-def first_deviations(layout: ObservationLayout) -> Array:
-    """Standard deviations of the first layer's initial weights, shape (n_observations,).
-
-    All parts of the observation count alike, or the few entries of the goal would drown.
-    """
-    sizes = np.array([layout.length(part) for part in layout.parts] * layout.history)
-    return np.repeat(DEVIATION / np.sqrt(len(sizes) * sizes), sizes)
-
-
-def initial_network(rng: np.random.Generator, deviations: Array, widths: Sequence[int]) -> Array:
+def initial_network(
+    rng: np.random.Generator, layout: ObservationLayout, widths: Sequence[int]
+) -> Array:
     """Draw a network whose last layer and biases are zero.
+
+    In the first layer, all parts of the observation count alike, or the few entries of the goal
+    would drown. In others, the standard deviation is one over the root of the inputs.
 
     Parameters
     ----------
     rng : numpy.random.Generator
         Draws the other weights, normal numbers.
-    deviations : ndarray, shape (n_observations,)
-        Standard deviations of the first layer's weights by input; in others,
-        one over the root of the inputs.
+    layout : ObservationLayout
+        The parts of the observation.
     widths : sequence of int
         Widths of the layers after the observation.
 
@@ -60,7 +55,8 @@ def initial_network(rng: np.random.Generator, deviations: Array, widths: Sequenc
     -------
     ndarray, shape (1, n_parameters)
     """
-    parts = []
+    sizes = np.array([layout.length(part) for part in layout.parts] * layout.history)
+    deviations, parts = np.repeat(DEVIATION / np.sqrt(len(sizes) * sizes), sizes), []
     for n_out in widths[:-1]:
         weights = perturbations(rng, (len(deviations), n_out)) * deviations[:, None]
         parts += [weights.ravel(), np.zeros(n_out)]

@@ -13,7 +13,7 @@ from kinarm.contact_pairs import make_verdicts_reliable
 from kinarm.evaluation.replay.playground import page_policy
 from kinarm.problem import PROBLEMS
 from kinarm.scene import Obstacle, Scene
-from kinarm.viewer.playground import play_page
+from kinarm.viewer.pages import play_page
 from kinarm.world import World
 
 ARMS = ("paper", "ur5")

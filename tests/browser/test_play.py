@@ -18,7 +18,7 @@ from kinarm.plant import Plant
 from kinarm.policies import load_policy
 from kinarm.policies.mirror import problem_mirror
 from kinarm.problem import ReachProblem
-from kinarm.viewer.playground import play_page
+from kinarm.viewer.pages import play_page
 
 ROLLOUT = "(r) => kinarm.rollout(r).map((end) => [end.joints, end.steps, end.outcome])"
 PATHS = "(r) => kinarm.rollout(r).map((end) => end.path)"

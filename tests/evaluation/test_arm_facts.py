@@ -4,9 +4,9 @@ import pytest
 
 from kinarm.arm import Arm
 from kinarm.arm_specification import AllowedContact
+from kinarm.contact_pairs import NEVER_TOUCH
 from kinarm.contact_statistics import contact_on_bare_ground
 from kinarm.evaluation.arm_facts import arm_facts, untested_pairs
-from kinarm.never_touching import NEVER_TOUCH
 
 
 @pytest.fixture(scope="module")

@@ -10,10 +10,9 @@ from reference_episodes import compare_actions
 from kinarm import Arm, ReachProblem, Simulator, World
 from kinarm.arm_specification import AllowedContact, ArmSpecification
 from kinarm.bodies import SHAPES, HeldBody
-from kinarm.contact_pairs import TOUCH_AT_HOME
+from kinarm.contact_pairs import NEVER_TOUCH, TOUCH_AT_HOME
 from kinarm.contact_statistics import arm_warnings, contact_on_bare_ground
 from kinarm.errors import KinarmError
-from kinarm.never_touching import NEVER_TOUCH
 from kinarm.problem_options import say_choices
 from kinarm.recording import record_path
 from kinarm.viewer.visual_shapes import arm_parts

@@ -7,8 +7,8 @@ from known_arms import INSTALLED
 from scipy.optimize import minimize
 
 from kinarm import Arm, Simulator
+from kinarm.contact_pairs import BEYOND, CLOSE, NEVER_TOUCH
 from kinarm.contact_statistics import contact_on_bare_ground
-from kinarm.never_touching import BEYOND, CLOSE, NEVER_TOUCH
 
 WIDE = '<limit lower="-3.2" upper="3.2" velocity="2" effort="0"/>'
 RADIUS, REACH = 0.05, 0.3

@@ -1,6 +1,7 @@
 """Networks as policies of Augmented Random Search, and its normal numbers."""
 
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -12,7 +13,6 @@ from kinarm.networks import split_parameters
 from kinarm.observation_layout import ObservationLayout
 from kinarm.policies import ARSConfig, train_policy
 from kinarm.policies.ars.networks import (
-    first_deviations,
     initial_network,
     logarithm,
     normal_pairs,
@@ -39,30 +39,23 @@ def by_networks(networks, row, observation):
     return forward([(weights[row], bias[row]) for weights, bias in networks.layers], observation)
 
 
-def test_first_network_does_nothing_and_has_lively_inner_layers():
-    deviations = np.repeat([0.5, 0.02], 200)
-    theta = initial_network(np.random.default_rng(0), deviations, (100, 50, 2))
-    assert theta.shape == (1, 401 * 100 + 101 * 50 + 51 * 2)
-    first, second, last = split_parameters(theta, (400, 100, 50, 2))
-    assert first.weights[..., :200].std() == pytest.approx(0.5, rel=0.02)
-    assert first.weights[..., 200:].std() == pytest.approx(0.02, rel=0.02)
-    assert second.weights.std() == pytest.approx(1 / 10, rel=0.05)
+@pytest.mark.parametrize("n_joints", [5, 7])
+def test_first_network_does_nothing_and_hears_all_parts_alike(n_joints):
+    layout = ObservationLayout.sized(PROBLEMS["right"], n_joints, n_joints)
+    n, parts = sum(map(layout.length, layout.parts)), layout.places.values()
+    theta = initial_network(np.random.default_rng(0), layout, (4000, 50, 2))
+    assert theta.shape == (1, (n + 1) * 4000 + 4001 * 50 + 51 * 2)
+    first, second, last = split_parameters(theta, (n, 4000, 50, 2))
+    heard = [np.square(first.weights[..., part]).sum(axis=-1).mean() for part in parts]
+    np.testing.assert_allclose(heard, 1.5**2 / len(heard), rtol=0.1)
+    assert second.weights.std() == pytest.approx(4000**-0.5, rel=0.05)
     still = (first.bias, second.bias, last.weights, last.bias)
     assert not any(array.any() for array in still)
 
 
-@pytest.mark.parametrize("n_joints", [5, 7])
-def test_all_parts_of_an_observation_are_heard_alike(n_joints):
-    layout = ObservationLayout.sized(PROBLEMS["right"], n_joints, n_joints)
-    deviations, parts = first_deviations(layout), layout.places.values()
-    heard = [np.square(deviations[part]).sum() for part in parts]
-    assert len(deviations) == max(part.stop for part in parts)
-    np.testing.assert_allclose(heard, 1.5**2 / len(heard))
-
-
 def test_perturbed_networks_take_raw_observations():
     rng = np.random.default_rng(1)
-    theta = rng.normal(size=initial_network(rng, np.ones(WIDTHS[0]), WIDTHS[1:]).shape)
+    theta = rng.normal(size=(1, sum(a * b + b for a, b in pairwise(WIDTHS))))
     step = 0.1 * rng.normal(size=(3, *theta.shape))
     data = rng.normal([1, 2, 3, 4, 5, 6, 7], [1, 2, 1, 2, 1, 2, 0], (50, 7))
     normalizer, x = Normalizer.of(data), rng.normal(size=7)

@@ -137,7 +137,7 @@ class TestInvariants:
         [
             ({"layers": ()}, "at least one layer"),
             ({"std": [1.0, -1.0]}, "std must not be negative"),
-            ({"layers": (Layer(np.ones((1, 3)), np.zeros(1)),)}, "weights of layer 0"),
+            ({"layers": (Layer(np.ones((1, 3)), np.zeros(1)),)}, "mean must have shape"),
             ({"layers": (Layer(np.ones((1, 2)), np.zeros(2)),)}, "bias of layer 0"),
             ({"activations": ("sine",)}, "function 'sine' .*available: linear, tanh, relu"),
             ({"mirror": Mirror([1.0, 1.0], [1.0, 1.0])}, "mirror of actions must have shape"),
