@@ -76,7 +76,7 @@ def _replace_step(session: Session, lane: int, e: int, before: Array, poses: Arr
     if lags:
         begun = as_numbers(block.former_drive)
     list_shares(lane, begun, session)
-    source, there, last = block, poses, lane
+    source, there, last, left = block, poses, lane, alone.shares.shape[0]
     n_projections, tried, nearest = 0, 0.0, math.inf
     while True:
         if not lags and last >= 0 and pair > 0 and n_projections < PROJECTIONS:
@@ -86,10 +86,14 @@ def _replace_step(session: Session, lane: int, e: int, before: Array, poses: Arr
         # Fill lanes, up to a projection or at last rest.
         count, last, tries.alive[0] = 0, -1, 0.0
         while count < LANES and last < 0:
+            while left > 0 and alone.off[alone.shares[0]] <= tried:
+                left -= 1
+                alone.shares[0] = alone.shares[left]
+                sink(0, left, session)
             chosen, off = -1, nearest
-            for k in range(alone.off.shape[0]):
-                if tried < alone.off[k] < off:
-                    chosen, off = k, alone.off[k]
+            if left > 0 and alone.off[alone.shares[0]] < off:
+                chosen = alone.shares[0]
+                off = alone.off[chosen]
             put_try(count, lane, chosen, off < math.inf, begun, session)
             tried, last = max(tried, off), count if chosen < 0 else -1
             count += 1
@@ -119,7 +123,7 @@ REPLACE_STEP = Stage(_replace_step, types.int64, types.int64, POSES, POSES)
 
 @inlined
 def list_shares(lane: int, begun: Array, session: Session) -> None:
-    """Fill in the step that an episode wants, and how far shares of it are from it."""
+    """Fill in the step that an episode wants, and a heap of its shares, the nearest first."""
     chain, rules, block, alone = session.chain, session.rules, session.block, session.alone
     action, step = as_numbers(block.action), alone.step[0]
     for axis in range(rules.step_limit.shape[0]):
@@ -131,7 +135,29 @@ def list_shares(lane: int, begun: Array, session: Session) -> None:
         for axis in range(rules.step_limit.shape[0]):
             left = (1.0 - rules.shield[k, axis]) * step[axis]
             off += left * left
-        alone.off[k] = off
+        alone.off[k], alone.shares[k] = off, k
+    for place in range(rules.shield.shape[0] // 2 - 1, -1, -1):
+        sink(place, rules.shield.shape[0], session)
+
+
+@inlined
+def sink(place: int, count: int, session: Session) -> None:
+    """Let a share sink in the heap, of the first so many, below those that come before it.
+
+    Of equally distant ones, the first of the table comes first.
+    """
+    shares, off = session.alone.shares, session.alone.off
+    sunk = shares[place]
+    while 2 * place + 1 < count:
+        below = 2 * place + 1
+        if below + 1 < count:
+            one, other = shares[below], shares[below + 1]
+            below += off[other] < off[one] or (off[other] == off[one] and other < one)
+        share = shares[below]
+        if off[sunk] < off[share] or (off[sunk] == off[share] and sunk < share):
+            break
+        shares[place], place = share, below
+    shares[place] = sunk
 
 
 @inlined

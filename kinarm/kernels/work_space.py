@@ -161,6 +161,8 @@ def layouts(
     in_lanes["open"] = (types.int64, (n_pairs + 1,))
     numbers["listed"] = (types.int64, (n_pairs + 1, Fixed(2)))
     numbers["suspected"] = (types.int64, (n_pairs,))
+    # A heap of the shares of a step.
+    numbers["shares"] = (types.int64, (shares,))
     return Layout("Block", in_lanes), Layout("Alone", numbers)
 
 
