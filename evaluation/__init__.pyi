@@ -12,7 +12,7 @@ from .finding import find_contestants as find_contestants
 from .metrics import METRICS as METRICS
 from .metrics import Metric as Metric
 from .outcomes import Outcomes as Outcomes
-from .replay.recordings import record as record
+from .replay import record as record
 from .report.page import report_page as report_page
 from .report.page import write_report as write_report
 from .request import EvaluationRequest as EvaluationRequest

@@ -170,7 +170,7 @@ class ReplayRequest(ProblemOptions):
         if self.play is None:
             page = self._replay(report)
         else:
-            from kinarm.evaluation.replay.playground import playground
+            from kinarm.evaluation.replay import playground
 
             with open_console(stderr=True).status("making the page"):
                 page = playground(self)
@@ -186,12 +186,12 @@ class ReplayRequest(ProblemOptions):
         KinarmError
             If a file, name or number cannot be used.
         """
-        from kinarm.evaluation.replay.recordings import chosen_recordings
+        from kinarm.evaluation.replay import chosen_recordings
 
         return chosen_recordings(self).runs
 
     def _replay(self, report: Callable[[str], object]) -> "HtmlPage":
-        from kinarm.evaluation.replay.recordings import chosen_recordings
+        from kinarm.evaluation.replay import chosen_recordings
         from kinarm.recording import save_recordings
         from kinarm.viewer import replay_page
 

@@ -65,8 +65,11 @@ class RunningOptions(Checked):
 
     def executor(self, folder: Path, threads: int = 1) -> "Executor":
         """Where trainings run; Slurm's jobs lie in the folder."""
-        from kinarm.evaluation.experiments.clusters import RayExecutor, SlurmExecutor
-        from kinarm.evaluation.experiments.executors import LocalExecutor
+        from kinarm.evaluation.experiments.executors import (
+            LocalExecutor,
+            RayExecutor,
+            SlurmExecutor,
+        )
 
         if self.ray is not None:
             return RayExecutor(self.ray, self.jobs, threads)

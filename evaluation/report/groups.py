@@ -13,7 +13,7 @@ from kinarm.errors import InvalidInputError
 from kinarm.evaluation.contestants import UNTRAINED, Contestant
 from kinarm.evaluation.document import EvaluationDocument, FacedProblem, PooledResult, Row
 from kinarm.evaluation.evaluation import Evaluation
-from kinarm.evaluation.replay.recordings import record
+from kinarm.evaluation.replay import record
 from kinarm.evaluation.selection import group_names
 from kinarm.evaluation.table import table_rows
 from kinarm.evaluation.trials import TrialSet

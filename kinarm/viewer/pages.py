@@ -211,7 +211,7 @@ def play_page(
         Where: bodies and goals stand, and steps are tested for contact throughout.
     policies : sequence of dict
         Policies to choose from, in the words of
-        `kinarm.evaluation.replay.playground.page_policy`; the first one runs
+        `kinarm.evaluation.replay.page_policy`; the first one runs
         at first.
     starts, goals : ndarray, shape (n, n_joints) and (n, goal_width)
         Starts [rad or m] and goals of the trials that the page offers.

@@ -10,7 +10,7 @@ from kinarm.arm import Arm
 from kinarm.bodies import Body
 from kinarm.collision import ContactModel
 from kinarm.contact_pairs import make_verdicts_reliable
-from kinarm.evaluation.replay.playground import page_policy
+from kinarm.evaluation.replay import page_policy
 from kinarm.problem import PROBLEMS
 from kinarm.scene import Obstacle, Scene
 from kinarm.viewer.pages import play_page

@@ -11,7 +11,7 @@ from random_policies import policy_for, sliding
 from kinarm import Observation, Scene, Simulator
 from kinarm.evaluation import ReplayRequest, TrialSet
 from kinarm.evaluation.bounds import oracle_bounds
-from kinarm.evaluation.replay.playground import PLAYED, page_policy
+from kinarm.evaluation.replay import PLAYED, page_policy
 from kinarm.goals import REST_PARTS, GoalSpecification
 from kinarm.observation import OBSERVATION
 from kinarm.plant import Plant

@@ -6,7 +6,7 @@ from documents import outcomes_of
 from random_policies import policy_for
 from refusals import check_refused
 
-from kinarm.evaluation.replay.playground import PLAYED
+from kinarm.evaluation.replay import PLAYED
 from kinarm.problem import ReachProblem
 from kinarm.recording import load_recordings, save_recordings
 

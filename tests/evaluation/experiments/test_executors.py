@@ -10,9 +10,14 @@ from small_tasks import kill_own_process_once, square, touch
 
 from kinarm.errors import InvalidInputError, WorkerError
 from kinarm.evaluation.commands.study import RunningOptions, StudyRequest
-from kinarm.evaluation.experiments import clusters
-from kinarm.evaluation.experiments.clusters import RayExecutor, SlurmExecutor, _do_alike
-from kinarm.evaluation.experiments.executors import Failure, LocalExecutor
+from kinarm.evaluation.experiments import executors
+from kinarm.evaluation.experiments.executors import (
+    Failure,
+    LocalExecutor,
+    RayExecutor,
+    SlurmExecutor,
+    _do_alike,
+)
 
 NOBODY = "127.0.0.1:9"
 """An address that nothing listens at."""
@@ -26,7 +31,7 @@ def _surroundings(monkeypatch):
     """Workers find the tasks of these tests."""
     monkeypatch.setenv("RAY_ACCEL_ENV_VAR_OVERRIDE_ON_ZERO", "0")
     monkeypatch.setenv("PYTHONPATH", str(Path(small_tasks.__file__).parent))
-    monkeypatch.setattr(clusters, "LOOK_SECONDS", 0.05)
+    monkeypatch.setattr(executors, "LOOK_SECONDS", 0.05)
 
 
 @pytest.fixture(
@@ -60,16 +65,16 @@ def test_nothing_to_do(executor):
 
 
 def test_work_of_another_kinarm_is_refused():
-    work = partial(_do_alike, square, {**clusters.identity(), "coal": "0.0.1"})
+    work = partial(_do_alike, square, {**executors.identity(), "coal": "0.0.1"})
     ((_, failure),) = LocalExecutor(1).map(work, [1])
     assert failure.error.startswith("a worker differs from this process: coal is ")
     assert failure.error.endswith(" there, 0.0.1 here")
 
 
 def test_workers_agree_on_packages_results_and_commits_that_are_known(monkeypatch):
-    here = clusters.identity()
+    here = executors.identity()
     assert {"python", "numpy", "numba", "coal", "pin", "semantics", "oracle semantics"} <= set(here)
-    monkeypatch.setattr(clusters, "source_commit", lambda: "0123abcd")
+    monkeypatch.setattr(executors, "source_commit", lambda: "0123abcd")
     assert _do_alike(square, {**here, "commit of kinarm": ""}, 3) == 9
     with pytest.raises(WorkerError, match="commit of kinarm is 0123abcd there, 4567 here"):
         _do_alike(square, {**here, "commit of kinarm": "4567"}, 3)

@@ -14,7 +14,7 @@ from kinarm.errors import InvalidInputError, OutputError, TrainingFailedError
 from kinarm.evaluation import evaluate, oracle_bounds
 from kinarm.evaluation.experiments import runs as training
 from kinarm.evaluation.experiments import study as studies
-from kinarm.evaluation.experiments.clusters import RayExecutor, SlurmExecutor
+from kinarm.evaluation.experiments.executors import RayExecutor, SlurmExecutor
 from kinarm.evaluation.experiments.study import Study
 from kinarm.evaluation.trials import TrialSet
 from kinarm.policies import recipe, train_policy

@@ -1,31 +1,44 @@
-"""Recordings to replay: of trials that are run now, or of a file."""
+"""What is replayed: trials that are run now, or of a file; and policies that run in a page."""
 
+import base64
 from collections import Counter
 from collections.abc import Collection, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from kinarm._fields import to_plain
-from kinarm.errors import InvalidInputError
+from kinarm.errors import InvalidInputError, KinarmError
 from kinarm.evaluation.bounds import oracle_bounds
 from kinarm.evaluation.contestants import ORACLE, Contestant
 from kinarm.evaluation.finding import check_normalizing, find_contestants
 from kinarm.evaluation.outcomes import failure_causes
 from kinarm.evaluation.trials import TrialSet
+from kinarm.policies.export import contract_of
 from kinarm.policies.oracle import OracleSolutions
+from kinarm.policies.policy import Policy
 from kinarm.policies.provenance import package_versions, source_commit
 from kinarm.problem import ReachProblem
+from kinarm.problem_options import say_choices
 from kinarm.recording import Recording, load_recordings, record_rollouts
+from kinarm.viewer.html_page import HtmlPage
+from kinarm.viewer.pages import play_page
+from kinarm.world import World
 
 if TYPE_CHECKING:
     from kinarm.evaluation.commands.replay import ReplayRequest
 
-PLAYED, SEARCHED, FAILING = 5, 200, 10_000
+SHOWN, SEARCHED, FAILING = 5, 200, 10_000
 """Default numbers of trials: to play, to choose from, to look for failures in."""
 
 MOST_FAILURES = 500
 """Most failures that a page holds."""
+
+PLAYED = ("ppo-best-both", "ppo-best-hard-paper", "ars-linear-both", "ars-paper-both")
+"""Policies that a playground has by default."""
+
+OFFERED = 20
+"""Trials that a page offers by default."""
 
 Trial = tuple[Recording, ...]
 """One trial as run by one policy, or by two."""
@@ -130,7 +143,7 @@ def _run_trials(request: "ReplayRequest") -> tuple[list[Trial], TrialSet | None]
         raise InvalidInputError("name a --policy, or a file of recordings")
     contestants, problem = named_contestants(request, names)
     searched = request.trial or request.worst
-    count = request.trials or (FAILING if request.failures else SEARCHED if searched else PLAYED)
+    count = request.trials or (FAILING if request.failures else SEARCHED if searched else SHOWN)
     trials = TrialSet.draw(problem, count, request.seed or 0)
     other = request.allow_other_arm
     runs = [record(contestant, trials, allow_other_arm=other) for contestant in contestants]
@@ -219,3 +232,50 @@ def _worst(trials: Sequence[Trial], count: int) -> list[Trial]:
             f"--worst {count} asks for more trials than there are: {len(found)}"
         )
     return list(found.values())[:count]
+
+
+def playground(request: "ReplayRequest") -> HtmlPage:
+    """Make the page of a request's policies; its trials are those of an evaluation.
+
+    Raises
+    ------
+    KinarmError
+        If a policy is of another arm or observation, or does not run in a page.
+    """
+    contestants, problem = named_contestants(request, request.play or PLAYED)
+    throughout = problem.replace(tested_configurations=0)
+    trials = TrialSet.draw(throughout, request.trials or OFFERED, request.seed or 0)
+    say_choices([trials.problem])
+    world, other = trials.simulator.world, request.allow_other_arm
+    players = [_player(each, world, allow_other_arm=other) for each in contestants]
+    shield = problem.stepping.shield or any(each.has_shield for each in contestants)
+    return play_page(world, players, trials.starts, trials.goals, shield=shield)
+
+
+def _player(contestant: Contestant, world: World, *, allow_other_arm: bool) -> dict[str, Any]:
+    """A contestant for a page, or one line that says why not."""
+    policy, name = contestant.policy, contestant.name
+    if policy is None:
+        raise InvalidInputError(
+            f"{name!r} does not run in a page: it is no dense network of kinarm's, or needs more "
+            "than its observation"
+        )
+    try:
+        contestant.check(world.problem, world.arm, allow_other_arm=allow_other_arm)
+        return page_policy(name, policy, world)
+    except KinarmError as refused:
+        raise InvalidInputError(f"{name!r} does not run here: {refused}") from refused
+
+
+def page_policy(name: str, policy: Policy, world: World) -> dict[str, Any]:
+    """A policy for a page: its contract, and its network with the normaliser folded in."""
+    networks, contract = policy.networks(), contract_of(policy, world)
+    parameters = networks.parameters[0].astype("<f8").tobytes()
+    return {
+        "name": name,
+        "contract": contract,
+        "widths": networks.widths,
+        "parameters": base64.b64encode(parameters).decode(),
+        "signs": networks.mirror and networks.mirror._asdict(),
+        "rates": networks.rates,
+    }

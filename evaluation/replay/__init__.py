@@ -1,1 +1,0 @@
-"""Replays: choosing and recording trials."""
