@@ -13,7 +13,7 @@ from kinarm._tables import csv_text
 from kinarm.evaluation.experiments import table
 from kinarm.evaluation.experiments.table import Group, shown
 from kinarm.evaluation.figures import Band, panels_figure, save_figure
-from kinarm.evaluation.report.templating import template
+from kinarm.evaluation.report.templating import markdown_table, template
 from kinarm.policies.provenance import package_versions, source_commit
 
 if TYPE_CHECKING:
@@ -86,8 +86,10 @@ def _page(name: str, study: "Study", document: dict[str, Any], curves: str) -> s
         best=best.items(),
         columns=table.COLUMNS,
         groups=groups,
+        rows=[[str(each.cell(group)) for each in table.COLUMNS] for group in study.groups()],
         curves=curves[curves.index("<svg") :] if curves else "",
         text=tomli_w.dumps(experiment.to_json()),
+        markdown_table=markdown_table,
     )
 
 
