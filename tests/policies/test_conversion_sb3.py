@@ -297,7 +297,7 @@ class TestRefused:
 
     def test_a_frame_stack(self):
         env = vec_env.VecFrameStack(vec_env.DummyVecEnv([MAKE["MlpPolicy"]]), 4)
-        self.check(sb3.PPO("MlpPolicy", env, device="cpu"), "or in a wrapper that changes observations")
+        self.check(sb3.PPO("MlpPolicy", env, device="cpu"), "a wrapper that changes observations")
 
     @pytest.mark.parametrize("space", [box(7), box(50)])
     def test_other_observations(self, space):
