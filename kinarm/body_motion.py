@@ -9,6 +9,9 @@ from numpy.typing import NDArray
 from kinarm._fields import OPTIONAL, Checked
 from kinarm.errors import ProblemError
 
+FARTHEST, FASTEST = 1e4, 100.0
+"""Largest entries of offsets and velocities [m and m/s]."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class BodyMotion(Checked):
@@ -38,6 +41,10 @@ class BodyMotion(Checked):
         times = [0.0, *(time for time, *_ in self.waypoints)]
         if any(later <= time for time, later in pairwise(times)):
             raise ProblemError(f"times of waypoints must rise from above 0 s, got {times[1:]}")
+        offsets = [part for _, *offset in self.waypoints for part in offset]
+        if max(map(abs, offsets), default=0.0) > FARTHEST or max(map(abs, self.velocity)) > FASTEST:
+            most = f"{FARTHEST:g} m, and velocities {FASTEST:g} m/s"
+            raise ProblemError(f"offsets of a motion must be at most {most}")
 
     def reflected(self, signs: tuple[float, float, float]) -> "BodyMotion":
         """The same motion, with these signs of x, y and z."""

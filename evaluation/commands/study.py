@@ -65,17 +65,14 @@ class RunningOptions(Checked):
 
     def executor(self, folder: Path, threads: int = 1) -> "Executor":
         """Where trainings run; Slurm's jobs lie in the folder."""
-        from kinarm.evaluation.experiments.executors import (
-            LocalExecutor,
-            RayExecutor,
-            SlurmExecutor,
-        )
+        from kinarm.evaluation.experiments import executors
 
         if self.ray is not None:
-            return RayExecutor(self.ray, self.jobs, threads)
+            return executors.RayExecutor(self.ray, self.jobs, threads)
         if self.slurm:
-            return SlurmExecutor(folder / "slurm", self.bundle or 1, self.minutes or 240, threads)
-        return LocalExecutor(self.jobs or available_threads(), threads)
+            place, bundle, minutes = folder / "slurm", self.bundle or 1, self.minutes or 240
+            return executors.SlurmExecutor(place, bundle, minutes, threads)
+        return executors.LocalExecutor(self.jobs or available_threads(), threads)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -75,20 +75,20 @@ def results_document(study: "Study", command: str) -> dict[str, Any]:
 
 def _page(name: str, study: "Study", document: dict[str, Any], curves: str) -> str:
     """A page that fetches nothing, by its template; equal input gives equal text."""
-    experiment, groups = study.experiment, study.best(len(study))
+    entries, groups = study.experiment.entries, study.best(len(study))
     best: dict[str, Group] = {}
     for group in groups:
         best.setdefault(group.config.problem.name, group)
     return template(name).render(
         document,
         study=study,
-        experiment=experiment,
         best=best.items(),
         columns=table.COLUMNS,
         groups=groups,
         rows=[[str(each.cell(group)) for each in table.COLUMNS] for group in study.groups()],
+        sources=[(each.title or each.name, each.source) for each in entries if each.source],
         curves=curves[curves.index("<svg") :] if curves else "",
-        text=tomli_w.dumps(experiment.to_json()),
+        text=tomli_w.dumps(study.experiment.to_json()),
         markdown_table=markdown_table,
     )
 

@@ -106,6 +106,8 @@ def test_motions_are_straight_between_waypoints(motion, time, offset):
         ({}, "either a velocity or waypoints"),
         ({"waypoints": [(2, 0, 0, 1), (1, 0, 0, 0)]}, "times of waypoints must rise"),
         ({"waypoints": [(1, 0, 0, 1)], "periodic": True}, "ends where it begins"),
+        ({"velocity": (200, 0, 0)}, "velocities 100 m/s"),
+        ({"waypoints": [(1, 0, 2e4, 0)]}, "at most 10000 m"),
     ],
 )
 def test_impossible_motions_are_refused(given, message):

@@ -46,8 +46,9 @@ def test_first_network_does_nothing_and_hears_all_parts_alike(n_joints):
     theta = initial_network(np.random.default_rng(0), layout, (4000, 50, 2))
     assert theta.shape == (1, (n + 1) * 4000 + 4001 * 50 + 51 * 2)
     first, second, last = split_parameters(theta, (n, 4000, 50, 2))
-    heard = [np.square(first.weights[..., part]).sum(axis=-1).mean() for part in parts]
-    np.testing.assert_allclose(heard, 1.5**2 / len(heard), rtol=0.1)
+    drawn = perturbations(np.random.default_rng(0), (n, 4000))
+    heard = [np.square(first.weights[0].T[part] / drawn[part]).sum(axis=0) for part in parts]
+    np.testing.assert_allclose(heard, 1.5**2 / len(heard))
     assert second.weights.std() == pytest.approx(4000**-0.5, rel=0.05)
     still = (first.bias, second.bias, last.weights, last.bias)
     assert not any(array.any() for array in still)
