@@ -92,8 +92,7 @@ def _replace_step(session: Session, lane: int, e: int, before: Array, poses: Arr
                 sink(0, left, session)
             chosen, off = -1, nearest
             if left > 0 and alone.off[alone.shares[0]] < off:
-                chosen = alone.shares[0]
-                off = alone.off[chosen]
+                chosen, off = alone.shares[0], alone.off[alone.shares[0]]
             put_try(count, lane, chosen, off < math.inf, begun, session)
             tried, last = max(tried, off), count if chosen < 0 else -1
             count += 1
@@ -152,9 +151,9 @@ def sink(place: int, count: int, session: Session) -> None:
         below = 2 * place + 1
         if below + 1 < count:
             one, other = shares[below], shares[below + 1]
-            below += off[other] < off[one] or (off[other] == off[one] and other < one)
+            below += (off[other], other) < (off[one], one)
         share = shares[below]
-        if off[sunk] < off[share] or (off[sunk] == off[share] and sunk < share):
+        if (off[sunk], sunk) < (off[share], share):
             break
         shares[place], place = share, below
     shares[place] = sunk
