@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Generic, NamedTuple, TypeVar
 
 from kinarm._console import open_console
 from kinarm._fields import Checked
-from kinarm.errors import check_names
+from kinarm.errors import check_known
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -84,7 +84,7 @@ class TableOptions(Checked):
     def chosen(self, known: Sequence[Column[T]]) -> list[Column[T]]:
         """The labels, and the columns of given names; without names, all columns."""
         by_name = {column.name: column for column in known}
-        check_names("column", self.columns, by_name)
+        check_known("column", self.columns, by_name)
         labels = (name for name, each in by_name.items() if each.is_label)
         names = dict.fromkeys((*labels, *self.columns)) if self.columns else by_name
         return [by_name[name] for name in names]

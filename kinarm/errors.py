@@ -94,7 +94,7 @@ class UnknownNameError(InvalidInputError):
         )
 
 
-def check_names(kind: str, given: Iterable[str], available: Collection[str]) -> None:
+def check_known(kind: str, given: Iterable[str], available: Collection[str]) -> None:
     """Refuse the first of the given names that is not available with `UnknownNameError`."""
     for name in given:
         if name not in available:

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from kinarm.episodes import Control
-from kinarm.errors import InvalidInputError, check_names, finite_array, whole_number
+from kinarm.errors import InvalidInputError, check_known, finite_array, whole_number
 from kinarm.kernels.compiling import Array
 
 
@@ -227,7 +227,7 @@ def network_control(
 
 def checked_activations(given: Sequence[Activation], n_layers: int) -> tuple[Activation, ...]:
     """Functions after some layers: as given, or the usual ones."""
-    check_names("activation function", map(str, given), get_args(Activation))
+    check_known("activation function", map(str, given), get_args(Activation))
     if not given:
         between: tuple[Activation, ...] = ("tanh",)
         return (*between * (n_layers - 1), "linear")

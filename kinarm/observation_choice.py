@@ -5,7 +5,7 @@ from dataclasses import dataclass, field, replace
 from typing import Any, cast
 
 from kinarm._fields import OPTIONAL, Checked, init_fields
-from kinarm.errors import ProblemError, check_names
+from kinarm.errors import ProblemError, check_known
 from kinarm.goals import GOAL_RESTS, REST_ERRORS, REST_PARTS
 
 PAPER_PARTS = ("goal", "goal_minus_tool", "orientation", "position")
@@ -49,7 +49,7 @@ class Observation(Checked):
             available = [part.name for part in OBSERVATION]
         if not self.parts:
             raise ProblemError(f"an observation needs parts; available: {', '.join(available)}")
-        check_names("part of the observation", self.parts, available)
+        check_known("part of the observation", self.parts, available)
         for name in self.parts:
             if self.parts.count(name) > 1:
                 raise ProblemError(f"the observation has the part {name!r} twice")
@@ -60,7 +60,7 @@ class Observation(Checked):
             change = {"parts": change}
         if not isinstance(change, Mapping):
             return cast("Observation", change)
-        check_names("field of an observation", change, init_fields(Observation))
+        check_known("field of an observation", change, init_fields(Observation))
         return replace(self, **change)
 
     def names(self, kind: str) -> tuple[str, ...]:

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from kinarm._fields import OPTIONAL, Checked, from_plain, init_fields, to_plain
 from kinarm._files import absolute, named_file, write_text
 from kinarm.arm_specification import ArmSpecification
-from kinarm.errors import ProblemError, check_names
+from kinarm.errors import ProblemError, check_known
 from kinarm.observation_choice import PAPER_PARTS, Observation
 from kinarm.plant import Plant
 from kinarm.problem_files import PAPER_TASKS, find_scene, problem_names, read_problem
@@ -74,7 +74,7 @@ class ReachProblem(Checked):
             raise ProblemError("a scene needs at least one goal region")
         if not self.task.goal_regions:
             object.__setattr__(self, "task", replace(self.task, goal_regions=tuple(available)))
-        check_names("goal region in task.goal_regions:", self.task.goal_regions, available)
+        check_known("goal region in task.goal_regions:", self.task.goal_regions, available)
         for name in self.task.goal_regions:
             obstacle = self.scene.obstacle_around(self.scene.goal_region(name))
             if obstacle is not None:
@@ -149,13 +149,13 @@ class ReachProblem(Checked):
         for name, what in (("reward", "reward term"), ("goal", "setting of goals")):
             if isinstance(given.get(name), Mapping):
                 of_part, own = dict(given[name]), getattr(task, name)
-                check_names(what, of_part, init_fields(type(own)))
+                check_known(what, of_part, init_fields(type(own)))
                 given[name] = replace(own, **of_part)
         for part, kind in PARTS.items():
             if own := _taken(given, kind):
                 changes[part] = replace(changes.get(part, getattr(self, part)), **own)
         settings = [name for kind in (ReachProblem, *PARTS.values()) for name in init_fields(kind)]
-        check_names("setting of a problem", given, settings)
+        check_known("setting of a problem", given, settings)
         return replace(self, **changes)
 
     def body_offsets(self, taken: NDArray[np.int64]) -> NDArray[np.float64]:

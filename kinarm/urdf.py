@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from kinarm._files import absolute, is_file, is_folder
 from kinarm.arm_specification import PACKAGE, ArmSpecification, arm_names
-from kinarm.errors import ArmError, UnknownNameError, check_names
+from kinarm.errors import ArmError, UnknownNameError, check_known
 from kinarm.meshes import resolve_meshes
 from kinarm.urdf_tree import MOVING, TreeJoint, chain_to, read_joints, read_robot
 
@@ -119,7 +119,7 @@ def _reduced(path: Path, specification: ArmSpecification) -> Description:
         ("link in held_bodies", [body.link for body in bodies], links),
         ("link in allowed_contacts", contacts, named_parts),
     ):
-        check_names(f"{what} of {path.name}:", named, known)
+        check_known(f"{what} of {path.name}:", named, known)
     for body in bodies:
         if named_parts.count(body.name) > 1:
             raise ArmError(f"held body {body.name!r} needs a name of its own")

@@ -8,7 +8,7 @@ from typing import Any
 
 from kinarm._fields import from_plain, init_fields, read_toml, take_base, to_plain
 from kinarm._files import shipped_files
-from kinarm.errors import InvalidInputError, UnknownNameError, check_names
+from kinarm.errors import InvalidInputError, UnknownNameError, check_known
 from kinarm.policies.config import ConfigT, merged
 from kinarm.policies.learners import Learner, find_learner
 from kinarm.problem import PROBLEMS
@@ -54,7 +54,7 @@ def recipe(learner: str, name_or_file: str | Path | None = None, **changes: Any)
         If there is no such learner, recipe or setting, or a value cannot be.
     """
     found = find_learner(learner)
-    check_names(f"setting of {learner}", changes, init_fields(found.config))
+    check_known(f"setting of {learner}", changes, init_fields(found.config))
     given = {key: value for key, value in changes.items() if value is not None}
     circumstances = {key: given.pop(key) for key in PER_TRAINING if key in given}
     named = str(name_or_file or found.first_recipe)

@@ -8,7 +8,7 @@ from typing import Any
 
 from kinarm._fields import OPTIONAL, Checked, from_plain, read_toml, to_plain
 from kinarm._files import named_file
-from kinarm.errors import FROM_ZERO, InvalidInputError, check_names, whole_number
+from kinarm.errors import FROM_ZERO, InvalidInputError, check_known, whole_number
 from kinarm.evaluation.experiments.curve import TrialSettings
 
 MOST_TRAININGS = 100_000
@@ -226,7 +226,7 @@ class Experiment(Checked):
             Trainings with each setting.
         """
         known = {entry.name: entry for entry in self.all_entries}
-        check_names("entry", entries, known)
+        check_known("entry", entries, known)
         chosen = tuple(known[name] for name in dict.fromkeys(entries)) or self.entries
         if problems:
             chosen = tuple(replace(entry, problems=()) for entry in chosen)

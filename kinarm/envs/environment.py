@@ -11,7 +11,7 @@ from numpy.typing import DTypeLike, NDArray
 from kinarm.envs.rendering import RENDER_MODES, EnvPictures
 from kinarm.episode_draws import scenes_at
 from kinarm.episodes import Episodes
-from kinarm.errors import InvalidInputError, UnknownNameError, check_names, one_or_many
+from kinarm.errors import InvalidInputError, UnknownNameError, check_known, one_or_many
 from kinarm.observation_part import UNIT, Ranges
 from kinarm.plant import MOST_NOISE, RANGES
 from kinarm.problem import ProblemLike, ReachProblem
@@ -235,7 +235,7 @@ def fixed_scenario(
     widths = {"start": arm.n_joints, "goal": simulator.world.goal_width}
     if len(wanted) == 1 and simulator.world.has_random_bodies:
         raise InvalidInputError("start and goal decide where random bodies are: set both")
-    check_names("reset option", wanted, widths)
+    check_known("reset option", wanted, widths)
     for name, value in wanted.items():
         array, one = one_or_many(name, value, (widths[name],))
         if not one and len(array) != n:

@@ -4,7 +4,7 @@ import tomllib
 from dataclasses import dataclass, field
 from typing import Any
 
-from kinarm.errors import NOT_NEGATIVE, POSITIVE, InvalidInputError, check_names
+from kinarm.errors import NOT_NEGATIVE, POSITIVE, InvalidInputError, check_known
 from kinarm.policies.config import MANY, Schedule, TrainingConfig
 from kinarm.policies.learners import Learner, TrainingState, imported
 from kinarm.policies.recipes import shipped_learner
@@ -77,7 +77,7 @@ class SB3Config(TrainingConfig):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        check_names("algorithm", [self.algorithm], ALGORITHMS)
+        check_known("algorithm", [self.algorithm], ALGORITHMS)
         if self.learning_rate_schedule == "linear" and "learning_rate" not in self.hyperparameters:
             raise InvalidInputError(
                 "learning_rate_schedule linear needs hyperparameters.learning_rate to start from"
